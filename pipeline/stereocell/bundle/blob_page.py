@@ -1,7 +1,7 @@
-"""The viewer's page as one document without an address: in a notebook's frame, or in one file.
+"""Make the viewer's page as one document without an address, for a notebook or a single file.
 
-Such a page can fetch nothing. `blob_page.js` makes the page's files addresses of their own (blob:),
-and the policy lets the page reach these alone.
+The document can't fetch files. `blob_page.js` gives each file of the page its own `blob:` address,
+and the document's policy allows only these addresses.
 """
 
 import base64
@@ -14,7 +14,7 @@ from stereocell.storage.assets import viewer_dist
 
 _START = Path(__file__).with_name("blob_page.js")
 _TAKEN = {".js", ".css", ".wasm"}
-# A worker from blob: inherits the page's policy, and the one that decodes textures calls eval.
+# The policy needs 'unsafe-eval': workers inherit it, and the one that decodes textures calls eval.
 _POLICY = (
     "default-src 'none'; script-src blob: 'unsafe-eval' 'sha256-{boot}'; style-src blob:; "
     "img-src data: blob:; connect-src data: blob:; worker-src blob:; base-uri 'none'; "
@@ -39,7 +39,7 @@ _DOCUMENT = """<!doctype html>
 
 
 def find_page() -> Path:
-    """Return the folder of the built viewer. Raises UsageError where there is none."""
+    """Return the folder of the built viewer. Raises UsageError if it is not built."""
     folder = viewer_dist()
     if folder is None:
         raise UsageError("the viewer is not built: run `make setup`, or install the wheel")
@@ -49,7 +49,7 @@ def find_page() -> Path:
 def document(script: Path, data: str = "") -> str:
     """Return a document that runs blob_page.js and then `script`.
 
-    data  lines of HTML that the script reads: no script may stand in them
+    data  lines of HTML that the script reads; they must not contain scripts that run
     """
     boot = "\n".join(file.read_text("utf-8") for file in (_START, script))
     digest = base64.b64encode(hashlib.sha256(boot.encode()).digest()).decode()
@@ -58,7 +58,7 @@ def document(script: Path, data: str = "") -> str:
 
 @cache
 def files() -> dict[str, bytes]:
-    """Return the page's files by name, packed by gzip where that is shorter."""
+    """Return the page's scripts, styles and WASM by name, as gzip if the build has packed them."""
     taken = {}
     for file in sorted((find_page() / "assets").iterdir()):
         if file.suffix in _TAKEN:

@@ -6,14 +6,14 @@ from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import FileRef, write_file
 from stereocell.model.errors import OutputError
 
-# The page of `stereocell serve --inbox`, compressed too, and its folder: it shows no bundle
+# Files of the page of `stereocell serve --inbox`, which does not show a bundle
 _INBOX = ("inbox.html", "inbox.html.br", "inbox.html.gz", "inbox_assets")
 
 
 def copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
-    """Copy the built viewer without the inbox; return its files.
+    """Copy the built viewer without the inbox page, and return its files.
 
-    Raises OutputError on a clash of names.
+    Raises OutputError if the bundle already has a file of the same name.
     """
     refs = []
     for source in sorted(viewer_dist.rglob("*")):

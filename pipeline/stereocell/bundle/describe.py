@@ -1,4 +1,4 @@
-"""Write what a channel of a bundle has once, and describe channels and bundle for the manifest."""
+"""Write the files that a channel has once in a bundle, and the manifest's entries."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -29,14 +29,15 @@ def describe_bundle(
     unfinished: Collection[str] = (),
     views: Sequence[StageView] = (),
 ) -> bytes:
-    """Return manifest.json, with its hash.
+    """Return the content of manifest.json, including its hash.
 
-    specimen  its name and modality, the fingerprint of its source, and where a patient's sides are
-    channels  as `describe_channel` returns them
-    index     files.json
-    more      specimen.usdz, or why there is none, and what layers add; None: nothing is said of it
-    unfinished  IDs of the tiles whose surfaces are not built yet, which volumes stand for
-    views     of the cameras that a layer adds to the stage
+    specimen    name, modality, fingerprint of the source, directions to a patient's sides
+    channels    entries, as `describe_channel` returns them
+    index       reference to files.json
+    more        entries for specimen.usdz, or the reason why there is none, and for additions and
+                lights of layers; None: the manifest has no such entries
+    unfinished  IDs of tiles whose surfaces are not built yet, so that their volumes are shown
+    views       named views, from cameras that a layer adds to the stage
     """
     manifest = {
         "format": "stereocell-bundle",
@@ -73,7 +74,7 @@ def _describe_view(view: StageView) -> dict[str, Any]:
 def write_channel(
     root: Path, appearance: ComposedAppearance, tiles: Sequence[tuple[str, TileChannel]]
 ) -> tuple[dict[str, Any], list[FileRef]]:
-    """Write what a channel has once; return its entry in the manifest, and the files."""
+    """Write the files that a channel has once; return its entry in the manifest, and the files."""
     folder = f"channels/{appearance.id}"
     drawn = [channel.lods for _, channel in tiles if channel.lods]
     tilesets = [
@@ -109,7 +110,11 @@ def describe_channel(
     tileset: FileRef | None,
     volumes: FileRef,
 ) -> dict[str, Any]:
-    """Return a channel's entry in the manifest; `triangles`, `distances` of each tile by level."""
+    """Return a channel's entry in the manifest.
+
+    triangles  for each tile, the number of triangles of each level
+    distances  for each tile, the 99th percentile and the largest distance of each level, um
+    """
     return {
         "id": appearance.id,
         "name": appearance.name,
@@ -137,7 +142,7 @@ def describe_channel(
 
 
 def _bake(appearance: ComposedAppearance) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """Return a row of 256 texels RGBA for each transfer function, uint8 (n, 256, 4)."""
+    """Return a row of 256 RGBA texels for each transfer function, uint8 (n, 256, 4)."""
     table = np.full((len(appearance.transfer_functions), 256, 4), 255, dtype=np.uint8)
     for row, points in zip(table, appearance.transfer_functions.values(), strict=True):
         row[:, 3] = np.rint(evaluate(points) * 255)
@@ -145,14 +150,20 @@ def _bake(appearance: ComposedAppearance) -> np.ndarray[Any, np.dtype[np.uint8]]
 
 
 def _totals(tiles: Iterable[Sequence[int]]) -> list[int]:
-    """Return the triangles of all tiles by level; a tile with fewer levels repeats its last."""
+    """Return the number of triangles of all tiles by level.
+
+    A tile with fewer levels counts with its coarsest level.
+    """
     given = [triangles for triangles in tiles if triangles]
     count = max((len(triangles) for triangles in given), default=0)
     return [sum(t[min(level, len(t) - 1)] for t in given) for level in range(count)]
 
 
 def _farthest(tiles: Iterable[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
-    """Return the largest distances of all tiles by level; as of triangles, the last repeats."""
+    """Return the largest distances of all tiles by level.
+
+    A tile with fewer levels counts with its coarsest level.
+    """
     given = [distances for distances in tiles if distances]
     count = max((len(distances) for distances in given), default=0)
     levels = ([d[min(level, len(d) - 1)] for d in given] for level in range(count))

@@ -1,15 +1,17 @@
-"""Levels of detail in a bundle where a mesh was edited by hand.
+"""Make the levels of detail of a bundle if an artist edited a mesh.
 
-An edited finest level becomes the reference surface: coarser levels are recomputed from it, by the
-same simplification, and distances are measured from it. A coarser level that the artist edited too
-stays, and its distance is measured. Where only coarser levels were edited, these are measured.
+If the finest level was edited, it becomes the reference surface. Coarser levels are computed again
+from it, by the same simplification as in the build, and distances are measured to it. A coarser
+level that was edited, too, stays as it is, and its distance is measured. If only coarser levels
+were edited, only their distances are measured again.
 
-Edits are detected by a hash: the pipeline writes that of each mesh's points and faces into its
-layer, and the bundle compares it with the composed mesh's. The layer of an opinion would not do: an
-edit in place and a flattened stage have one layer. A stage without hashes counts as unedited.
-A transform of one level alone, among the levels of a mesh, is an edit too.
+Edits are detected by a hash. The build writes a hash of each mesh's points and faces into its
+layer, and the bundle compares it with the hash of the composed mesh. It is not enough to look at
+the layers of opinions, because a layer that was edited in place and a flattened stage have only one
+layer. A stage without hashes counts as unedited. Moving one level of a mesh and not the others is
+also an edit.
 
-Edited meshes are validated anew.
+Edited meshes are checked for defects again.
 """
 
 import json
@@ -56,7 +58,7 @@ _Types = Sdf.ValueTypeNames
 
 
 class _Options(NamedTuple):
-    """The options by which levels are made."""
+    """The options with which levels are computed."""
 
     lod: LodOptions
     unwrap: UnwrapOptions
@@ -75,16 +77,18 @@ _DEFECTS = {
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """The levels of a bundle, finest first, and a line about edits, or an empty one."""
+    """The levels that a bundle shows, finest first, and a message about edits, or empty."""
 
     lods: tuple[ComposedLod, ...]
     edit: str = ""
 
 
 def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
-    """Return a loaded tile's levels of one channel from `finest` on.
+    """Return a channel's levels in a loaded tile, without those finer than `finest`.
 
-    Raises StageError where a mesh can't be drawn, or has a point that is not finite.
+    finest  finest level to return; 0: all levels
+
+    Raises StageError if a mesh can't be drawn, or has a point that is not finite.
     """
     lods = list(read_lods(tile, channel_id))
     emptied = find_emptied(tile, channel_id)
@@ -103,7 +107,7 @@ def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
 
 
 def _edited_levels(lods: Sequence[ComposedLod]) -> set[int]:
-    """Return the levels whose shape differs from the built one, or that were moved alone."""
+    """Return the levels whose shape differs from the build, or that were moved separately."""
     edited = {lod.level for lod in lods if lod.shape != lod.built}
     if len({lod.own for lod in lods}) > 1:
         still = tuple(np.eye(4).ravel().tolist())
@@ -114,13 +118,20 @@ def _edited_levels(lods: Sequence[ComposedLod]) -> set[int]:
 def _follow(
     tile: Usd.Prim, channel_id: str, lods: list[ComposedLod], edited: set[int]
 ) -> tuple[list[ComposedLod], list[str]]:
-    """Return the levels, with those recomputed from an edited one, and lines about the edits."""
+    """Return all levels, with new coarser ones if needed, and remarks about the edits.
+
+    lods    levels as they are composed, finest first
+    edited  levels that were edited
+    """
     fine, options = lods[0], _options(tile.GetStage())
     planes = _cut_planes(tile, channel_id, fine)
     to_fine = Nearest(fine.mesh, options.lod.samples)
 
     def measured(lod: ComposedLod, past_um: float = 0.0) -> ComposedLod:
-        """Return the level with its distances from the finest, and as much as that is away."""
+        """Return the level with its distances from the finest level.
+
+        past_um  distance of the finest level from the iso-surface, which is added
+        """
         to_mesh = Nearest(lod.mesh, options.lod.samples)
         ways = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
         most = max(way.p99 for way in ways), max(way.max for way in ways)
@@ -143,7 +154,8 @@ def _follow(
             result.append(lod)
         return result, remarks
     remarks = [describe(fine)]
-    # an opinion outside the variants lies over all levels: it is the finest's edit, not their own
+    # An opinion outside of the variants applies to all levels. Coarser levels then have the same
+    # shape as the finest, and do not count as edited themselves.
     own = {lod.level for lod in lods[1:] if lod.level in edited and lod.shape != fine.shape}
     made = _make(tile, channel_id, lods, options, planes) if len(own) < len(lods) - 1 else {}
     result = [replace(fine, distance_um=0.0, largest_um=0.0)]
@@ -169,7 +181,7 @@ def _make(
     options: _Options,
     planes: tuple[Plane, ...],
 ) -> dict[int, tuple[ComposedLod, int]]:
-    """Return the coarser levels recomputed from the finest, by level, and their defect counts."""
+    """Compute the coarser levels from the finest one, and count their faults, by level."""
     fine, first = lods[0], lods[0].level + 1
     spacing = _spacing(tile, channel_id, fine)
     mesh, _ = _certified(
@@ -201,7 +213,7 @@ def _make(
     before = fine, 0
     for past, lod in pairwise(lods):
         place = lod.level - first
-        # a channel with fewer levels than others repeats its last
+        # A channel with fewer levels than other channels repeats its coarsest level.
         if (lod.built and lod.built == past.built) or place >= len(made):
             found = replace(before[0], level=lod.level), before[1]
         else:
@@ -219,7 +231,14 @@ def _make(
 def _compose(
     made: Lod, lod: ComposedLod, fine: ComposedLod, source: Mesh, others: Sequence[Baker]
 ) -> ComposedLod:
-    """Return a recomputed level, in world um; `others` sample the green and blue components."""
+    """Return a computed level in world um, with its maps or its values at vertices.
+
+    made    the level, in the mesh's own space; its paint is the red component of the colours
+    lod     the level before the edit
+    fine    the edited finest level
+    source  mesh of `fine` with values at vertices
+    others  sample the green and the blue component of the colours
+    """
     mesh, baked = made.mesh, made.baked
     assert baked is not None
     color: NDArray[np.float32] | None = None
@@ -257,7 +276,10 @@ def _compose(
 
 
 def with_vertex_values(mesh: Mesh, maps: ComposedMaps | MadeMaps) -> Mesh:
-    """Return the mesh with the occlusion and colours of its maps at its vertices."""
+    """Return the mesh with values at vertices that are sampled from its maps.
+
+    The values are occlusion and colours, linear RGB. Values that the mesh already has are kept.
+    """
     if mesh.uvs is None:
         return mesh
 
@@ -280,11 +302,11 @@ def with_vertex_values(mesh: Mesh, maps: ComposedMaps | MadeMaps) -> Mesh:
 
 
 def with_vertex_occlusion(lod: ComposedLod) -> Mesh:
-    """Return a level's mesh with the occlusion of its map at its vertices, if it has such a map.
+    """Return a level's mesh with occlusion at its vertices, sampled from its map if there is one.
 
-    Vertices of one place, which charts have split, get the mean of what each finds in the map.
-    The values are the mesh's `openness`, float32 (n,), 0..1. Raises StageError where the map can't
-    be read.
+    Vertices at the same position, which seams of charts have split, get the mean of their samples.
+    The values are the mesh's `openness`, float32 (n,), 0..1. Raises StageError if the map can't be
+    read.
     """
     maps = lod.images or lod.maps
     if maps.occlusion is None or lod.mesh.openness is not None:
@@ -298,13 +320,18 @@ def with_vertex_occlusion(lod: ComposedLod) -> Mesh:
 
 
 def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
-    """Return the mesh and its defects; it is welded where seams of UVs or normals cut it open."""
+    """Return the mesh and its defects.
+
+    Seams of UVs or normals count as open edges. So vertices at the same position are joined if the
+    mesh then has fewer defects.
+    """
     defects = find_defects(mesh, planes=planes)
     if not defects.total:
         return mesh, defects
     _, first, twin = np.unique(mesh.positions, axis=0, return_index=True, return_inverse=True)
     triangles = first[twin.ravel()][mesh.triangles].astype(np.uint32)
-    has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)  # at a UV pole they lack it
+    # Triangles at the pole of a UV sphere collapse.
+    has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     triangles = triangles[has_area]
     welded = compact(mesh, triangles)
     found = find_defects(welded, planes=planes)
@@ -324,9 +351,10 @@ def _describe(defects: Defects) -> str:
 
 
 def _cut_planes(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[Plane, ...]:
-    """Return the planes where the mesh is open to another tile: the faces of its tile's box.
+    """Return the faces of the tile's box at which the mesh is open.
 
-    The stage names no planes. Vertices of a cut lie on one bit by bit; moved vertices do not.
+    The stage does not state these planes. They are found by open edges near the box's faces whose
+    two ends have exactly the same coordinate. Vertices that an artist moved do not have that.
     """
     mesh = read_local(tile, channel_id, fine.level)
     low, high = _box(tile, channel_id) or (
@@ -350,7 +378,7 @@ def _volume(tile: Usd.Prim, channel_id: str) -> Usd.Prim:
 
 
 def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return the corners (x, y, z) of a tile's box in its own space, um; None: no volume."""
+    """Return the corners (x, y, z) of a tile's box in its own space, um; None without a volume."""
     prim = _volume(tile, channel_id)
     low, high = (
         read_as(prim.GetAttribute(f"stereocell:bounds{end}"), _Types.Double3) if prim else None
@@ -362,7 +390,7 @@ def _box(tile: Usd.Prim, channel_id: str) -> tuple[NDArray[np.float64], NDArray[
 
 
 def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> Spacing:
-    """Return the voxel spacing (z, y, x), um; without a volume, the median length of an edge."""
+    """Return the voxel spacing (z, y, x), um; without a volume, the median edge of the mesh."""
     box, prim = _box(tile, channel_id), _volume(tile, channel_id)
     size = None
     if box is not None:
@@ -379,7 +407,7 @@ def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> Spacing:
 
 
 def _options(stage: Usd.Stage) -> _Options:
-    """Return the options by which the stage's levels were made; defaults where it states none.
+    """Return the options with which the stage's levels were made, or the defaults.
 
     Raises StageError for invalid values.
     """
@@ -395,7 +423,7 @@ def _options(stage: Usd.Stage) -> _Options:
 
 
 def _read_options(kind: type[T], content: Mapping[str, Any], where: str) -> T:
-    """Return a section of settings; keys of other versions are ignored. Raises StageError."""
+    """Return options from a section of settings. Ignores unknown keys. Raises StageError."""
     known = {field.name for field in fields(kind)}  # type: ignore[arg-type]
     values = {
         key: json.loads(value) if isinstance(value, str) and value.startswith("[") else value
@@ -411,7 +439,7 @@ def _read_options(kind: type[T], content: Mapping[str, Any], where: str) -> T:
 
 
 def _odd_units(tile: Usd.Prim, channel_id: str, level: int) -> Iterator[str]:
-    """Yield a line where the layer of the points has other units."""
+    """Yield a message if the layer with the edited points states other units than um."""
     prim = mesh_at(tile, channel_id, level)
     stack = prim.GetAttribute("points").GetPropertyStack() if prim else []
     for spec in stack[:1]:

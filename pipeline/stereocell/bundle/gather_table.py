@@ -1,4 +1,4 @@
-"""Put the objects of all tiles together as one table: an object cut into pieces has one row."""
+"""Merge the objects of all tiles into one table, with one row for an object in several tiles."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,11 +13,11 @@ from stereocell.model.object_table import Column, ObjectTable
 def gather_table(
     described: tuple[list[Column], str] | None, tiles: Sequence[tuple[str, TileChannel]]
 ) -> ObjectTable | None:
-    """Return the table of a channel's objects in all tiles that are shown; None: it has none.
+    """Return the table of a channel's objects in all given tiles; None: there are no objects.
 
-    described  its columns without values, and the one that colours first; None: it is no label map
+    described  columns without values, and the ID of the default column; None: not a label map
 
-    An object in several tiles has its values from the first one.
+    The values of an object in several tiles come from the first of them.
     """
     own = {tile: channel.objects for tile, channel in tiles if channel.objects is not None}
     if described is None or not own:
@@ -26,7 +26,7 @@ def gather_table(
     labels = {tile: np.frombuffer(one.labels, "<u8") for tile, one in own.items()}
     every = np.concatenate(list(labels.values()))
     found, first, times = np.unique(every, return_index=True, return_counts=True)
-    # by the tiles' order, those in several tiles last
+    # Rows are in the order of tiles. Objects in several tiles come last.
     order = np.lexsort((first, times > 1))
     row = np.empty(len(found), np.int32)
     row[order] = np.arange(len(found), dtype=np.int32)
@@ -47,7 +47,7 @@ def gather_table(
 def _joined_boxes(
     boxes: NDArray[np.float32], rows: NDArray[np.int32], count: int
 ) -> NDArray[np.float32]:
-    """Return the box around all pieces of each object (n, 6)."""
+    """Return the box (n, 6) around all pieces of each object: least and largest (x, y, z)."""
     joined = np.empty((count, 6), np.float32)
     joined[:, :3], joined[:, 3:] = np.inf, -np.inf
     np.fmin.at(joined[:, :3], rows, boxes[:, :3])
@@ -69,9 +69,9 @@ def _names(own: dict[str, PackedObjects], kept: NDArray[np.int64]) -> tuple[str,
 def _walls(
     own: dict[str, PackedObjects], found: NDArray[np.uint64], row: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the rows of objects that share a wall, each pair once, and the walls' areas, um^2.
+    """Return pairs of rows (m, 2) whose objects share an interface, and its area (m,), um^2.
 
-    Hidden tiles' are left out.
+    Each pair occurs once. Objects in hidden tiles are left out.
     """
     pairs = np.concatenate([np.frombuffer(o.touching, "<u8") for o in own.values()]).reshape(-1, 2)
     at = np.searchsorted(found, pairs).clip(0, len(found) - 1)

@@ -1,7 +1,7 @@
-"""The manifest of a bundle, which holds a hash of itself: the one place where commands read it.
+"""Read the manifest of a bundle. All commands that read it use this module.
 
-It names files.json, which names every other file. So whoever reads the manifest here knows that
-the whole bundle can be trusted, wherever it lies, once each file fits its hash.
+The manifest holds a hash of itself and the hash of files.json, which holds the hashes of all other
+files. So a bundle is undamaged if its manifest can be read here and each file has its hash.
 """
 
 import re
@@ -18,7 +18,7 @@ MANIFEST = "manifest.json"
 FILES = "files.json"
 SCHEMA = "bundle.schema.json"
 REMEDY = "run `stereocell bundle OUT`"
-# paths of the files that bundles have, where no list says which: its own, and those of the viewer
+# Paths that belong to a bundle or its viewer, in case files.json can't be read
 _PATHS = re.compile(
     r"(channels|volumes|luts|assets|environments)/.*|manifest\.json|files\.json|specimen\.usdz|additions\.glb|room\.exr"
     r"|(index\.html|sw\.js)(\.br|\.gz)?|app\.webmanifest|icon[\w-]*\.(png|svg)"
@@ -28,15 +28,16 @@ _PATHS = re.compile(
 def read_manifest(bundle: Path, remedy: str = REMEDY) -> dict[str, Any]:
     """Return the manifest of a bundle, without its hash.
 
-    Raises OutputError where it is missing, breaks its schema, or was changed since it was written.
+    Raises OutputError if it is missing, violates its schema, or has changed since it was written.
     """
     return read_sealed(bundle / MANIFEST, SCHEMA, remedy)
 
 
 def find_others(bundle: Path) -> list[str]:
-    """Return the files in a bundle's folder that are none of its own, by their relative paths.
+    """Return the relative paths of files in a bundle's folder that do not belong to the bundle.
 
-    Its list says which are its own; where that is lost or damaged, their paths do.
+    The bundle's own files are those of files.json. If that is missing or damaged, they are known by
+    their paths.
     """
     names = {path for path in sizes_of(bundle) if not is_ignored(path.rpartition("/")[2])}
     try:
@@ -46,7 +47,7 @@ def find_others(bundle: Path) -> list[str]:
 
 
 def require_bundle(place: Path) -> None:
-    """Raise OutputError if something else than a bundle lies there. Its manifest may be lost."""
+    """Raise OutputError if a place holds other files than a bundle. The manifest may be missing."""
     is_other = place.exists() and not place.is_dir()
     if MANIFEST in sizes_of(place) or not (is_other or (others := find_others(place))):
         return

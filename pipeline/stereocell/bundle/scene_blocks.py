@@ -1,7 +1,8 @@
-"""The blocks of a scene in one file: how `export` writes them, and how `check` reads them.
+"""Write and read the blocks of scene.html, a scene in one file.
 
-A block is an element of HTML that no browser runs. It holds a file as base64, with the SHA-256 of
-the bytes that the base64 stands for. The rest of the document is its page: a policy and a script.
+`export` writes the blocks, and `check` reads them. A block is a script element that browsers do not
+run. It holds a file as base64, and the SHA-256 of the file's bytes. The rest of the document is the
+page: a policy and a script that runs.
 """
 
 import base64
@@ -14,17 +15,17 @@ from dataclasses import dataclass, field
 
 from stereocell.model.errors import OutputError
 
-PAGE, FILE = "page", "file"  # kinds of blocks: a file of the viewer, a file of the bundle
+PAGE, FILE = "page", "file"  # kinds of blocks, for a file of the viewer and one of the bundle
 REMEDY = "copy the file again, or write it anew with `stereocell export OUT scene.html`"
-# the end of a link, as the viewer writes it (viewer_gltf/src/share/permalink.ts)
+# Fragment of a link to a view, as viewer_gltf/src/share/permalink.ts writes it
 VIEW = re.compile(r"#v=\d+(&[\w.~:;,=!*'()%+/@$?-]*)*", re.ASCII)
 _VIEW_BLOCK = re.compile(r' *<script type="text/plain" data-view>([^<]*)</script>\n')
 _BLOCK = re.compile(
     r' *<script type="application/octet-stream" data-(page|file)="([^"<>]*)"'
     r' data-bytes="(\d+)" data-sha256="([0-9a-f]{64})"( data-packed)?>([^<]*)</script>\n'
 )
-# Most bytes that the files take unpacked, for each byte of the document. Tables of objects, which
-# shrink the most, take 20.
+# Largest size of all unpacked files / size of the document. Tables of objects, which shrink the
+# most, have a ratio of 20.
 _MAX_GROWTH = 50
 
 
@@ -32,9 +33,9 @@ _MAX_GROWTH = 50
 class SceneBlocks:
     """The content of a scene in one file.
 
-    page   the viewer's files by name, as they are in the document
-    files  the bundle's files by path, unpacked
-    view   the end of a link; empty: the bundle's own opening
+    page   files of the viewer by name; some are gzip, as the viewer's build packed them
+    files  files of the bundle by path, unpacked
+    view   fragment of a link to the view at opening; empty: the default view of the bundle
     rest   the document without its blocks
     """
 
@@ -45,9 +46,9 @@ class SceneBlocks:
 
 
 def block(kind: str, name: str, data: bytes, is_packed: bool) -> str:
-    """Return a file's block.
+    """Return the block of a file.
 
-    is_packed  the data are gzip, and the reader gets the file that they unpack to
+    is_packed  whether `data` is gzip and the reader shall unpack it
     """
     attributes = f'data-{kind}="{html.escape(name)}" data-bytes="{len(data)}"'
     attributes += f' data-sha256="{hashlib.sha256(data).hexdigest()}"'
@@ -57,12 +58,12 @@ def block(kind: str, name: str, data: bytes, is_packed: bool) -> str:
 
 
 def view_block(view: str) -> str:
-    """Return the block of the view that the scene opens with; nothing for an empty view."""
+    """Return the block with the view at opening; an empty text for an empty view."""
     return f'    <script type="text/plain" data-view>{view}</script>\n' if view else ""
 
 
 def read_blocks(document: str) -> SceneBlocks:
-    """Return the content of a document. Raises OutputError for a block that is damaged."""
+    """Return the content of a document. Raises OutputError for a damaged or repeated block."""
     found = SceneBlocks(view="".join(_VIEW_BLOCK.findall(document)))
     room = _MAX_GROWTH * len(document)
     for kind, escaped, size, digest, packed, text in _BLOCK.findall(document):
@@ -91,7 +92,7 @@ def _decoded(name: str, text: str, size: int, digest: str) -> bytes:
 
 
 def _unpacked(name: str, data: bytes, most: int) -> bytes:
-    """Return what gzip data unpack to. Raises OutputError where that is more than `most` bytes."""
+    """Unpack gzip data. Raises OutputError if the result has more than `most` bytes."""
     unpacker = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
     try:
         content = unpacker.decompress(data, max(1, most))

@@ -1,7 +1,7 @@
-"""The part of a bundle that one tile brings: its record, and the references to its files.
+"""Write and read a tile's part of a bundle: its record, and references to its files.
 
-A tile's part is a folder that holds its files under their names in the bundle, and tile.json, which
-says what the bundle's own files need to know of it.
+The part is a folder. It holds the tile's files under their paths in the bundle, and the record
+tile.json with the data that the bundle's common files need.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ _RECORD = "tile.json"
 
 @dataclass(frozen=True, slots=True)
 class FileRef:
-    """A file of the bundle. `path` is relative to its root, with forward slashes."""
+    """A file of the bundle. `path` is relative to the bundle's root, with forward slashes."""
 
     path: str
     bytes: int
@@ -34,14 +34,14 @@ class FileRef:
 
 @dataclass(frozen=True, slots=True)
 class PackedObjects:
-    """The objects of one tile: little-endian arrays as bytes.
+    """The objects of one tile, as bytes of little-endian arrays.
 
-    labels    uint64 (n,)
-    names     by object; empty: there are none
+    labels    uint64 (n,), numbers in the label map
+    names     name of each object; empty: the objects have no names
     values    float32 (n,) by column ID
-    boxes     float32 (n, 6): least and largest (x, y, z), world um
-    touching  uint64 (m, 2), labels of objects that share a wall
-    wall_um2  float32 (m,), its area; NaN: not known
+    boxes     float32 (n, 6), least and largest (x, y, z), world um
+    touching  uint64 (m, 2), labels of objects that share an interface
+    wall_um2  float32 (m,), area of each interface, um^2; NaN: not known
     """
 
     __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
@@ -56,16 +56,17 @@ class PackedObjects:
 
 @dataclass(frozen=True, slots=True)
 class TileChannel:
-    """One (tile, channel) in the bundle.
+    """One channel of a tile in the bundle.
 
-    lods       for the tileset, finest first; addresses relative to it
-    triangles  by level of detail; levels finer than the finest have as many as that
-    distances  by level, too: the stated and the largest distance from the iso-surface, um
-    volume     its entry in volumes.json, or None
-    files      all that was written
-    joint      the volume's histogram of value and gradient, packed; see bundle/write_transfer2d.py
-    objects    of a label map's tile; None: it has none
-    edit       what was edited by hand of its surface, and what follows from that; or empty
+    lods       levels for the tileset, finest first; addresses are relative to the tileset
+    triangles  number of triangles of each level; left-out finer levels repeat the finest one
+    distances  99th percentile and largest distance from the iso-surface of each level, um
+    volume     entry in volumes.json; None: no volume
+    files      all files of this channel and tile
+    joint      joint histogram of the volume, packed, see bundle/write_transfer2d.py; None: no
+               volume
+    edit       message about edits of the surface by hand; empty: none
+    objects    objects of a label map; None: none
     """
 
     __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
@@ -85,10 +86,10 @@ class TileChannel:
 class BundleTile:
     """One tile in the bundle.
 
-    low      corner (x, y, z) of its box in the world, um
-    high     the opposite corner
-    name     for people; empty: the stage has none
-    changed  paths of its layers that differ from the stage's list, from the stage's folder
+    low      lower corner (x, y, z) of the tile's box, world um
+    high     upper corner
+    changed  paths of the tile's layers that differ from the stage's list, relative to the stage
+    name     display name; empty: none
     """
 
     id: str
@@ -101,7 +102,7 @@ class BundleTile:
 
 
 def write_file(root: Path, path: str, content: bytes) -> FileRef:
-    """Write one file of a bundle. Raises OutputError."""
+    """Write one file of a bundle, and return the reference to it. Raises OutputError."""
     write_bytes(root / path, content)
     return FileRef(path, len(content), hashlib.sha256(content).hexdigest())
 
@@ -112,7 +113,7 @@ def _records() -> TypeAdapter[BundleTile]:
 
 
 def read_part(part: Path) -> BundleTile:
-    """Return the tile whose part lies in a folder. Raises OutputError where it isn't whole."""
+    """Return the tile whose part is in a folder. Raises OutputError if files are missing."""
     remedy = "run `stereocell bundle OUT` again"
     try:
         tile = _records().validate_python(read_json(part / _RECORD, None, remedy))
@@ -120,12 +121,12 @@ def read_part(part: Path) -> BundleTile:
         raise OutputError(f"{part / _RECORD}: damaged: {remedy}") from None
     sizes = sizes_of(part)
     refs = [ref for channel in tile.channels for ref in channel.files]
-    # by these names files are moved: they must be of this folder
+    # Files are moved by these paths, so each must be a file of this folder.
     if tile.id != part.name or any(sizes.get(ref.path) != ref.bytes for ref in refs):
         raise OutputError(f"{part}: damaged: {remedy}")
     return tile
 
 
 def write_record(root: Path, tile: BundleTile) -> None:
-    """Write the record of a tile's part into its folder. Raises OutputError."""
+    """Write tile.json into the folder of a tile's part. Raises OutputError."""
     write_json(root / _RECORD, _records().dump_python(tile, mode="json"))

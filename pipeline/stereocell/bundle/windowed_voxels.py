@@ -1,8 +1,8 @@
-"""The voxels of a composed volume in 8 bits, by the window of the composed stage.
+"""Read the voxels of a composed volume as 8 bits, with the window of the composed stage applied.
 
-A window that was edited is applied to the voxels as they were measured, where the stage has them:
-the bundle is, to the bit, that of a build with this window. From a stage without them it is made of
-the 8 bits of the window that was built, and steps of these stay.
+An edited window is applied to the voxels as measured, if the stage has them. The result is exactly
+that of a build with this window. Without them, the 8-bit voxels of the build are rescaled, so their
+steps remain visible.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def read_windowed(
     measured = volume.measured if is_edited else None
     if as_written is not None:
         if volume.measured is not None:
-            as_written.require(volume.measured)  # the bundle states its hash, whoever reads it
+            as_written.require(volume.measured)  # the bundle states the hash of this file
         if measured is None:
             as_written.require(volume.atlas)
     if measured is not None:
@@ -42,7 +42,7 @@ def read_windowed(
 
 
 def read_measured(volume: ComposedVolume) -> NDArray[np.float32]:
-    """Return the voxels as measured, with the apron, (z, y, x). Raises StageError."""
+    """Return the voxels as measured, float32 (z, y, x), with the apron. Raises StageError."""
     assert volume.measured is not None
     values = VdbValues(volume.measured, MEASURED_NAME)
     low, high, size = (np.array(corner) for corner in (volume.low, volume.high, volume.size))

@@ -1,16 +1,17 @@
-"""Put the web bundle of a composed stage together, as schemas/bundle.schema.json describes it.
+"""Assemble the web bundle of a composed stage, as schemas/bundle.schema.json describes it.
 
-    manifest.json  files.json                      written last: they hash all others
+    manifest.json  files.json                      written last: they hold the other files' hashes
     channels/<channel>/tileset.json  volumes.json  <tile>/lodK.glb  <tile>/finer.json
                        transfer2d.json  histogram2d.ktx2
     volumes/<tile>/<channel>.ktx2  <channel>_bricks.ktx2
     luts/<channel>.ktx2
-    additions.glb                                  what a layer adds: see write_additions
-    specimen.usdz                                  its surfaces, small: see write_ar
+    additions.glb                                  meshes that layers add: see write_additions
+    room.exr                                       light of the surroundings: see write_lights
+    specimen.usdz                                  a small copy for AR viewers: see write_ar
     index.html  assets/                            the viewer
 
-The stage is the only source. Tiles are exported each by itself, as parts that stay until the bundle
-is whole.
+The stage is the only source. Each tile is exported separately as a part, and the parts are kept
+until the bundle is complete.
 """
 
 from collections.abc import Iterator, Sequence
@@ -65,11 +66,12 @@ from stereocell.usd.written_files import CHANGED, REMEDY, AsWritten
 
 @dataclass(frozen=True, slots=True)
 class Composed:
-    """A composed stage, opened to be exported.
+    """A composed stage that was opened for the export.
 
-    appearances  of its channels
-    tile_ids     of the tiles that are visible
-    step_m       of the lattice of all meshes, metres: see formats/gltf.py
+    appearances  appearances of all channels
+    tile_ids     IDs of the visible tiles
+    step_m       step of the lattice for vertices of all meshes, metres, see formats/gltf.py
+    as_written   compares files with the stage's list before they are read
     """
 
     path: Path
@@ -81,7 +83,7 @@ class Composed:
 
     @classmethod
     def open(cls, path: Path) -> "Composed":
-        """Open a stage, or a layer over it. Raises StageError, naming prim and file."""
+        """Open a stage, or a layer over it. Raises StageError if it can't be shown."""
         as_written = AsWritten()
         as_written.require_layers(path.parent)
         stage = open_stage(path)
@@ -98,9 +100,11 @@ class Composed:
         return cls(path, stage, appearances, names, step_m, as_written)
 
     def notes(self, built: Path) -> Iterator[str]:
-        """Yield notes on units that the layer does not state, on another specimen than the built
-        stage's, on materials above channels, and on each edit that the bundle does not take over.
-        Raises StageError for an edit over time.
+        """Yield messages for the user about the stage.
+
+        They are about: another specimen than that of the built stage, missing units, materials
+        above the channels, missing lights, and each edit that the bundle does not take over. Raises
+        StageError for an animated value.
         """
         if note := note_on_source(self.stage, built):
             yield note
@@ -113,25 +117,26 @@ class Composed:
         yield from self._notes_on_parts()
 
     def _notes_on_parts(self) -> Iterator[str]:
-        """Yield a line on each edit of which a part is lost."""
+        """Yield a message for each edit that is partly lost."""
         yield from notes_on_rolls(views_of(self.stage))
         yield from notes_on_additions(self.stage)
         yield from notes_on_lights(lights_of(self))
 
     def require_all_taken(self) -> None:
-        """Raise StageError where the bundle does not take over an edit."""
+        """Raise StageError if the bundle does not take over all edits completely."""
         require_no_lost_edit(self.stage, self._notes_on_parts())
 
 
 def fill_bundle(
     composed: Composed, parts: Sequence[Path], root: Path, viewer_dist: Path | None
 ) -> Iterator[str]:
-    """Write a bundle into an empty folder; yield notes meanwhile.
+    """Write a bundle into an empty folder, and yield messages for the user.
 
-    parts        the finished tiles, whose files may be moved away
-    viewer_dist  the built viewer; None: the bundle has no page
+    parts        folders of the finished tiles, whose files are moved into the bundle
+    viewer_dist  folder of the built viewer; None: the bundle gets no page
 
-    Notes name each layer that is not as it was written, and each surface that was edited by hand.
+    The messages name layers that changed since the build and surfaces that were edited by hand, and
+    give the reason if there is no specimen.usdz.
     """
     stage = composed.stage
     tiles = [read_part(part) for part in parts]
@@ -188,9 +193,9 @@ def fill_bundle(
 
 
 def _write_added(composed: Composed, root: Path) -> tuple[dict[str, Any], list[FileRef]]:
-    """Write what layers add beside the tiles: meshes, curves and lights.
+    """Write the meshes, curves and lights that layers add.
 
-    Returns what the manifest says of them, and the files. Raises StageError and OutputError.
+    Returns their entries in the manifest, and the files. Raises StageError and OutputError.
     """
     described: dict[str, Any] = {}
     files: list[FileRef] = []
@@ -211,7 +216,7 @@ def views_of(stage: Usd.Stage) -> list[StageView]:
 
 
 def lights_of(composed: Composed) -> StageLights | None:
-    """Return the light that a user's layers give the stage; None: they give none.
+    """Return the lights that a user's layers edit or add; None: the viewer uses its own lamps.
 
     Raises StageError.
     """
@@ -220,13 +225,13 @@ def lights_of(composed: Composed) -> StageLights | None:
 
 
 def _box_of(stage: Usd.Stage) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lowest and the highest corner (x, y, z) of all tiles, um."""
+    """Return the lower and the upper corner (x, y, z) of the box around all tiles, world um."""
     boxes = np.array([hinted_box(prim) for prim in tile_prims(stage)])
     return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
 
 def _specimen_of(stage: Usd.Stage) -> dict[str, Any]:
-    """Return the specimen as the manifest describes it."""
+    """Return the manifest's entry for the specimen, without its bounds."""
     specimen: dict[str, Any] = {"name": specimen_name(stage), "modality": modality_of(stage)}
     if fingerprint := fingerprint_of(stage):
         specimen["fingerprint"] = fingerprint

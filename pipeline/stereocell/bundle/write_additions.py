@@ -1,6 +1,7 @@
-"""Write what layers add to the specimen as one file of the bundle: additions.glb.
+"""Write additions.glb: the meshes and curves that layers add to the specimen.
 
-A mesh is a node below the root, whose extras have its ID. The viewer shows and hides each.
+Each addition is a node below the root, with its ID in the node's extras. The viewer shows and hides
+each of them.
 """
 
 import tempfile
@@ -23,10 +24,10 @@ ADDITIONS = "additions.glb"
 
 @dataclass(frozen=True, slots=True)
 class WrittenAdditions:
-    """The file, and the additions that are in it.
+    """The file additions.glb and its content.
 
-    layers     their IDs and names, in the stage's order
-    low, high  the corners (x, y, z) of the box around them, um
+    layers     ID and name of each addition, in the stage's order
+    low, high  corners (x, y, z) of the box around all additions, world um
     """
 
     file: FileRef
@@ -35,7 +36,7 @@ class WrittenAdditions:
     high: list[float]
 
     def describe(self) -> dict[str, Any]:
-        """Return what the manifest says of the additions."""
+        """Return the manifest's entry for the additions."""
         file = {"path": self.file.path, "bytes": self.file.bytes, "sha256": self.file.sha256}
         bounds = {"min": self.low, "max": self.high}
         return {"file": file, "layers": list(self.layers), "bounds_um": bounds}

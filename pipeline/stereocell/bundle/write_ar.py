@@ -1,7 +1,8 @@
-"""The bundle's specimen.usdz, for viewers of augmented reality: the page links it on iOS.
+"""Write the bundle's specimen.usdz for augmented reality. On iOS, the page has a link to it.
 
-It is made anew from the composed stage, so that it shows an artist's edits. A phone loads it whole
-before it shows anything: a file above MAX_USDZ_BYTES is left out, and the manifest says why.
+The bundle does not copy the stage's specimen.usdz but writes another one from the composed stage,
+which includes an artist's edits. A phone loads the whole file before it shows anything. So a file
+above MAX_USDZ_BYTES is left out, and the manifest gives the reason.
 """
 
 from pathlib import Path
@@ -11,7 +12,7 @@ from stereocell.storage.file_list import measure
 from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
 from stereocell.usd.written_files import AsWritten
 
-MAX_USDZ_BYTES = 20 * 2**20
+MAX_USDZ_BYTES = 20 * 2**20  # bytes, largest specimen.usdz
 NO_SURFACE = "no surface is drawn"
 
 
@@ -20,8 +21,9 @@ def write_ar(
 ) -> tuple[dict[str, Any] | None, str]:
     """Write specimen.usdz of a stage, or of a layer over it, into `root`.
 
-    Returns its path, size and hash, and ""; or None, and why there is none. Raises StageError where
-    the stage can't be read or a file of it is damaged, OutputError where the file can't be written.
+    Returns its path, size and hash with an empty text, or None with the reason why there is none.
+    Raises StageError if a file of the stage can't be read or is damaged, and OutputError if the
+    file can't be written.
     """
     path = root / USDZ_NAME
     if write_usdz(stage_path, path, as_written=as_written) is None:
@@ -29,7 +31,7 @@ def write_ar(
     entry = {"path": USDZ_NAME, **measure(path)}
     if entry["bytes"] <= MAX_USDZ_BYTES:
         return entry, ""
-    path.unlink()  # of a folder that is stored once it is whole
+    path.unlink()  # the folder is not stored yet, so deleting the local file is enough
     return None, (
         f"{entry['bytes'] / 2**20:.0f} MiB, more than the {MAX_USDZ_BYTES / 2**20:.0f} MiB "
         "that a phone is sent"

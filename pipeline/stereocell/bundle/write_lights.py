@@ -1,4 +1,4 @@
-"""Write the light of a stage for the viewer: its lamps, and the light of its domes as one image."""
+"""Write the lights of a stage for the viewer: its lamps, and one image for all its domes."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,10 @@ ROOM = "room.exr"
 
 
 def write_lights(lights: StageLights, root: Path) -> tuple[dict[str, Any], list[FileRef]]:
-    """Return what the manifest says of a stage's light, and the file. Raises OutputError."""
+    """Write the domes' image if there is one; return the manifest's entry for lights, and the file.
+
+    Raises OutputError.
+    """
     described: dict[str, Any] = {"lamps": [_describe_lamp(lamp) for lamp in lights.lamps]}
     if lights.room is None:
         return described, []

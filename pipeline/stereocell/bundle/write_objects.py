@@ -1,16 +1,20 @@
 """Write the table of a label map's objects, as schemas/objects.schema.json describes it.
 
-    objects.json        the columns, and which rows are in which tile
-    objects/            raw arrays: labels, boxes, and two files a column
+    objects.json        the columns, and the rows of each tile
+    objects/            raw arrays: labels, boxes, and two files per column
 
-The viewer colours by one column at a time, so each is a file, of a byte an object: 20 000 objects
-are recoloured by 20 kB. The exact values lie beside it, for when they are read out: by ranges of
-ROWS, so that one object's values of 20 columns don't take 20 files of 100 000.
+The viewer colours objects by one column at a time. So each column is a file with one byte per
+object: to recolour 20 000 objects, the viewer loads 20 kB. A second file has the exact values. The
+viewer loads them in ranges of ROWS, so it need not load whole columns to show one object's values.
 
-A byte's scale. 1 to 255 span the 0.1th to the 99.9th percentile, so that one wild value doesn't
-make all others equal. They lie evenly, or evenly in the logarithm where that shows more: all values
-are positive, their span is tenfold or more, and the median lies nearer to its middle in the
-logarithm. Means of markers are such columns, shapes and places are not.
+Bytes 1 to 255 span the 0.1th to the 99.9th percentile, so that one extreme value does not make all
+others equal. Their scale is linear or logarithmic. It is logarithmic if three conditions hold:
+
+- all values are positive
+- the span's upper end is at least ten times its lower end
+- the median is nearer to the middle of the span on the logarithmic scale than on the linear one
+
+Means of markers are typical logarithmic columns. Shapes and positions are linear.
 """
 
 from dataclasses import asdict
@@ -26,9 +30,9 @@ from stereocell.model.object_table import MISSING, Column, ObjectTable
 from stereocell.storage.json_files import compact_json
 
 OBJECTS = "objects.json"
-ROWS = 4096  # rows of a range of exact values: 16 kB
-_SPAN = (0.1, 99.9)  # percentiles that bytes 1 and 255 stand for
-_LOG_FROM = 10.0  # least ratio of the span's ends for a logarithmic scale
+ROWS = 4096  # rows in a range of exact values, which has 16 kB
+_SPAN = (0.1, 99.9)  # percentiles of the values that bytes 1 and 255 stand for
+_LOG_FROM = 10.0  # smallest ratio of the span's ends for a logarithmic scale
 
 
 def write_objects(
@@ -36,7 +40,7 @@ def write_objects(
 ) -> tuple[FileRef, list[FileRef]]:
     """Write a channel's table below `folder` of a bundle; return objects.json, and all files.
 
-    paint  ID of the channel whose intensity is at the vertices; empty: none is
+    paint  ID of the channel whose intensity colours the vertices; empty: none
 
     Raises OutputError.
     """
@@ -62,7 +66,7 @@ def write_objects(
         content["paint"] = paint
     for i, column in enumerate(table.columns):
         data, entry = _describe(column)
-        # two IDs may differ by their case alone, and some disks don't tell such names apart
+        # The number keeps names apart on disks that ignore case: IDs may differ only by case.
         entry["bytes"] = write(f"{i}_{column.id}.u8", data)
         values = column.values.astype("<f4")
         entry["exact"] = write(f"{i}_{column.id}.f32", values)
@@ -83,13 +87,13 @@ def write_objects(
 
 
 def hash_parts(data: bytes) -> list[str]:
-    """Return the SHA-256 of each ROWS exact values of a column."""
+    """Return the SHA-256 of each range of ROWS exact values in a column's float32 bytes."""
     size = ROWS * np.dtype("<f4").itemsize
     return [sha256(data[at : at + size]).hexdigest() for at in range(0, len(data), size)]
 
 
 def _compact(rows: NDArray[np.int32]) -> dict[str, Any]:
-    """Return the longest run of rows from the first on, and the rows behind it."""
+    """Describe rows as a run of consecutive rows from the first on, and a list of the others."""
     if len(rows) == 0:
         return {"first": 0, "count": 0}
     is_next = rows == rows[0] + np.arange(len(rows))
@@ -99,7 +103,7 @@ def _compact(rows: NDArray[np.int32]) -> dict[str, Any]:
 
 
 def _describe(column: Column) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-    """Return a column's bytes and its entry but for the files."""
+    """Return a column's bytes, and its entry without the references to files."""
     entry: dict[str, Any] = {
         "id": column.id,
         "name": column.name,
@@ -120,7 +124,7 @@ def _describe(column: Column) -> tuple[NDArray[np.uint8], dict[str, Any]]:
 
 
 def _quantize(values: NDArray[np.float32]) -> tuple[NDArray[np.uint8], dict[str, Any] | None]:
-    """Return numbers as bytes, 0: missing, and the range that they span; None: all are missing."""
+    """Quantize numbers to bytes (0: missing), and describe their range; None: all are missing."""
     data = np.zeros(len(values), dtype=np.uint8)
     is_known = np.isfinite(values)
     known = values[is_known].astype(np.float64)
@@ -144,9 +148,11 @@ def _quantize(values: NDArray[np.float32]) -> tuple[NDArray[np.uint8], dict[str,
 def _neighbours(
     walls: NDArray[np.int32], count: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.int64]]:
-    """Return where each row's neighbours begin (count + 1,), all neighbours, ascending, an order.
+    """Return the neighbours of each row as a flat list.
 
-    It brings the walls, and behind them the same from the other side, into the neighbours' order.
+    Returns the index of each row's first neighbour (count + 1,), all neighbours (2 m,), ascending
+    within a row, and an order (2 m,). The order sorts two copies of the interfaces, one after the
+    other, in the same way as the neighbours.
     """
     both = np.concatenate([walls, walls[:, ::-1]])
     order = np.lexsort((both[:, 1], both[:, 0]))

@@ -1,7 +1,6 @@
-"""Write what one tile brings to a bundle: its meshes and volumes. Tiles are independent.
+"""Write the part of a bundle for one tile: its meshes and volumes, and its record.
 
-A tile's part is a folder that holds its files under their names in the bundle, and tile.json, which
-says what the bundle's own files need to know of it.
+Tiles do not depend on each other. See tile_part.py for the folder of a part.
 """
 
 from collections.abc import Sequence
@@ -45,7 +44,7 @@ from stereocell.usd.read_volume import ComposedVolume, read_volume
 from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.written_files import AsWritten
 
-FIRST_COLUMN = "volume_um3"  # first column of every table of objects
+FIRST_COLUMN = "volume_um3"  # ID of the first column in every table of objects
 
 
 def write_tile(
@@ -55,12 +54,13 @@ def write_tile(
     appearances: tuple[ComposedAppearance, ...],
     step_m: float,
 ) -> None:
-    """Write the part of the tile that its folder is named by; see gltf.py for the lattice step.
+    """Write the part of one tile.
 
-    step_m  of the lattice, metres
+    part    folder of the part, whose name is the tile's ID
+    step_m  step of the lattice for vertices, metres, see formats/gltf.py
 
-    Opens the stage anew and loads this tile only, so that it runs in any process and the memory
-    of the others does not grow. Raises StageError and OutputError.
+    Opens the stage and loads only this tile. So it can run in any process, and tiles do not stay in
+    memory. Raises StageError and OutputError.
     """
     as_written = AsWritten()
     stage = open_stage(stage_path)
@@ -97,13 +97,15 @@ def write_tile(
 
 
 def path_from_stage(file: Path, stage_path: Path) -> str:
-    """Return a layer's path from the folder of the stage; of one that lies elsewhere, its own."""
+    """Return a layer's path relative to the stage's folder, or else its whole path."""
     folder = stage_path.absolute().parent
     return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else str(file)
 
 
 def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tuple[Point, Point]:
-    """Return the corners (x, y, z), world um, of a loaded tile's volumes; without any, of its box.
+    """Return the corners (x, y, z), world um, of the box around a loaded tile's volumes.
+
+    Without volumes, these are the corners of the tile's extentsHint.
 
     Raises StageError.
     """
@@ -142,7 +144,7 @@ def _export_channel(
         triangles += [len(lod.mesh.triangles)] * (lod.level + 1 - len(triangles))
         distances += [(lod.distance_um, lod.largest_um)] * (lod.level + 1 - len(distances))
         if glb.data == finer:
-            continue  # a channel with fewer levels than others repeats its last
+            continue  # a channel with fewer levels than others repeats its coarsest level
         finer = glb.data
         if lod is levels[-1] and lods:
             lod = _bare(lod)
@@ -170,13 +172,14 @@ def _export_channel(
 
 
 def _bare(lod: ComposedLod) -> ComposedLod:
-    """Return the coarsest level without what only shows from near: it is what all wait for first.
+    """Return the coarsest level without details that show only at close range.
 
-    Of the sample's coarsest levels, maps, their UVs and the vertices that charts had split were
-    five sixths of the bytes. Its occlusion goes from the map to the vertices, where the finest
-    level has it: a tile doesn't brighten from level to level. Its lattice is that of all levels: on
-    a longer step positions would take a third less, and stand apart from a finer neighbour's by up
-    to three quarters of a voxel.
+    Users wait for this level first. In the sample, maps, UVs and vertices that charts had split
+    were five sixths of the coarsest level's bytes. The occlusion moves from the map to the
+    vertices, as the finest level has it, so a tile's brightness does not change with the level.
+
+    The lattice is that of all other levels. With a longer step, positions would take a third less,
+    but there would be gaps of up to three quarters of a voxel to a finer neighbour.
     """
     mesh = with_vertex_occlusion(lod)
     maps = replace(lod.maps, normal=None, occlusion=None)
@@ -188,13 +191,13 @@ def _bare(lod: ComposedLod) -> ComposedLod:
 
 
 def _welded(mesh: Mesh) -> Mesh:
-    """Return the mesh without the vertices that are in all like an earlier one."""
+    """Merge vertices that are equal in all values."""
     parts = [mesh.positions, mesh.normals, mesh.colors, mesh.openness, mesh.objects, mesh.paint]
     values = [part.reshape(len(mesh.positions), -1) for part in parts if part is not None]
     _, first, twin = np.unique(
         np.concatenate(values, axis=1), axis=0, return_index=True, return_inverse=True
     )
-    kept = np.sort(first)  # in the order that they had
+    kept = np.sort(first)  # keeps the order of vertices
     triangles = np.searchsorted(kept, first)[twin.ravel()][mesh.triangles].astype(np.uint32)
     return replace(
         mesh,
@@ -211,7 +214,7 @@ def _welded(mesh: Mesh) -> Mesh:
 def _objects(
     tile: Usd.Prim, channel_id: str, levels: Sequence[ComposedLod]
 ) -> tuple[PackedObjects | None, Features | None]:
-    """Return the objects of a tile's channel, and what each of its files says of them."""
+    """Return the objects of a tile's channel, and the features that its .glb files get."""
     described = read_columns(tile.GetStage(), channel_id)
     prim = mesh_at(tile, channel_id, levels[0].level) if levels else None
     if described is None or prim is None:
@@ -259,7 +262,7 @@ def _encode(
             textures=textures,
             features=features if lod.mesh.objects is not None else None,
         )
-    except ValueError as error:  # what an artist may have done to the mesh
+    except ValueError as error:  # an artist's edit made the mesh invalid
         raise StageError(f"{prim}: lod{lod.level}: {error}") from error
 
 

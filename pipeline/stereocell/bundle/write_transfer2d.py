@@ -1,11 +1,11 @@
-"""Write a channel's 2D transfer functions, and the histogram that they are placed in.
+"""Write a channel's 2D transfer functions and its joint histogram.
 
-channels/<channel>/transfer2d.json    shapes by function, and their numbers: transfer2d.schema.json
-channels/<channel>/histogram2d.ktx2   voxels by value and gradient magnitude, on a logarithmic scale
+channels/<channel>/transfer2d.json    shapes of each function, numbers: see transfer2d.schema.json
+channels/<channel>/histogram2d.ktx2   number of voxels by value and gradient, on a logarithmic scale
 
-The counts are of the bundle's own 8-bit volumes, so that a panel shows what its shader draws, and
-what is hidden or has another window in the stage shows so. Files of their own: a phone asks for
-them when a 2D function is drawn or edited.
+Voxels are counted in the bundle's 8-bit volumes, so the histogram fits the image that the viewer
+draws. Hidden tiles do not count, and edited windows do. The files are separate, because a phone
+needs them only if a 2D function is drawn or edited.
 """
 
 import zlib
@@ -22,7 +22,7 @@ from stereocell.model.world_box import WorldPoint
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
 from stereocell.usd.composed_appearance import ComposedAppearance
 
-COUNTED_VOXELS = 4_000_000  # voxels of a tile; a larger tile is counted in part
+COUNTED_VOXELS = 4_000_000  # voxels of a tile; in a larger tile, planes are skipped
 _STORED = np.dtype("<u4")
 
 
@@ -44,17 +44,20 @@ class PlacedVolume(Protocol):
 
 
 def count_tile(voxels: NDArray[np.uint8], volume: PlacedVolume, gradient_max: float) -> bytes:
-    """Return the counts of one tile's volume, packed: thousands of them wait for their sum.
+    """Count the voxels of one tile by value and gradient.
 
-    uint8 (z, y, x) with the apron, whose voxels are neighbours only. A plane that tiles share is
-    counted in each.
+    voxels        uint8 (z, y, x), with the apron; its voxels give gradients but are not counted
+    gradient_max  gradient of the histogram's last row, see transfer/joint_histogram.py
+
+    Returns compressed counts, since the counts of thousands of tiles are stored until they are
+    added. A plane that two tiles share is counted in both.
     """
     box = zip(volume.low, volume.high, volume.size, strict=True)
     x, y, z = ((b - a) / max(1, n - 1 - 2 * volume.apron) for a, b, n in box)
-    cut = volume.apron - 1  # one voxel round what is counted
+    cut = volume.apron - 1  # leaves a border of one voxel around the counted voxels
     own = voxels[(slice(cut, -cut or None),) * 3] if cut >= 0 else np.pad(voxels, 1, mode="edge")
     every = -(-own.size // COUNTED_VOXELS)
-    # a single plane is no distance thick
+    # A volume of a single plane has spacing 0 across it. It gets the finest other spacing.
     finest = min(step for step in (x, y, z, 1.0) if step > 0)
     spacing = (z or finest, y or finest, x or finest)
     counts = count_joint(own, spacing, gradient_max=gradient_max, every=every)
@@ -62,7 +65,7 @@ def count_tile(voxels: NDArray[np.uint8], volume: PlacedVolume, gradient_max: fl
 
 
 def sum_tiles(tiles: Iterable[bytes]) -> NDArray[np.int64]:
-    """Return the counts of all tiles, int64 (ROWS, COLUMNS); no tile: zeros."""
+    """Return the sum of the counts of all tiles, int64 (ROWS, COLUMNS)."""
     total = np.zeros(ROWS * COLUMNS, np.int64)
     for packed in tiles:
         total += np.frombuffer(zlib.decompress(packed), _STORED)
@@ -70,12 +73,15 @@ def sum_tiles(tiles: Iterable[bytes]) -> NDArray[np.int64]:
 
 
 def encode_histogram(counts: NDArray[np.int64]) -> bytes:
-    """Return the counts as a picture: KTX2, R8, row 0 is gradient 0."""
+    """Return the counts as an image: KTX2, R8, logarithmic; row 0 is gradient 0."""
     return encode_2d(log_scaled(counts)[..., np.newaxis]).data
 
 
 def describe(
     appearance: ComposedAppearance, counts: NDArray[np.int64], histogram: dict[str, Any]
 ) -> dict[str, Any]:
-    """Return what transfer2d.json holds; `histogram`: the reference to its file."""
+    """Return the content of transfer2d.json.
+
+    histogram  reference to the file of the histogram
+    """
     return {**asdict(appearance.transfer_2d), "histogram": histogram, "most": int(counts.max())}

@@ -1,4 +1,4 @@
-"""Write one volume of a bundle: a 3D texture with its mip levels, and the ranges of its bricks."""
+"""Write one volume of a bundle: a 3D texture with mip levels, and the ranges of its bricks."""
 
 import hashlib
 from dataclasses import asdict
@@ -24,13 +24,13 @@ def write_volume(
     voxels: NDArray[np.uint8],
     counted: NDArray[np.uint8] | None = None,
 ) -> tuple[dict[str, Any], list[FileRef], bytes]:
-    """Write one volume; return its entry in volumes.json, its files and its counts.
+    """Write one volume; return its entry in volumes.json, its files and its joint histogram.
 
-    voxels   uint8 (z, y, x) with the apron, window applied
-    counted  voxels of as many, of which the counts are; None: those that are written
+    voxels   uint8 (z, y, x), with the apron, after the window
+    counted  voxels of the same shape for the histogram; None: `voxels`
 
-    The counts are the histogram of value and gradient, packed as `count_tile` returns them.
-    Raises OutputError where a file can't be written.
+    The histogram is compressed, as `count_tile` returns it. Raises OutputError if a file can't be
+    written.
     """
     counted = voxels if counted is None else counted
     texture = encode_3d(mip_levels(voxels))
@@ -47,7 +47,7 @@ def write_volume(
         "size": list(volume.size),
         "apron": volume.apron,
         "bounds_um": {"min": list(volume.low), "max": list(volume.high)},
-        # row by row for row vectors is column by column for column vectors
+        # Rows of a matrix for row vectors are columns of the same matrix for column vectors.
         "matrix": [float(n) for n in volume.matrix.ravel()],
         **({} if volume.measured is None else {"measured": measure(volume.measured)}),
         "levels": [

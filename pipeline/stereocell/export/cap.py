@@ -1,9 +1,11 @@
-"""Close a surface where tiles were cut and the neighbour is not there: hidden, or moved away.
+"""Close a surface at the faces of tiles whose neighbour is missing: hidden, or moved away.
 
-All open edges lie in the planes between tiles. In each plane they bound the places where the solid
-went on: polygons, with holes, that are filled. Where two such planes meet, a polygon of each ends
-at the line that both have in common, at the same points; the solid crosses the line between the
-first and the second, the third and the fourth, and so on, since it ends before the specimen does.
+All open edges lie in the planes between tiles. In each plane, they bound the cross-sections of the
+solid: polygons with holes, which are filled with triangles.
+
+At the line where two of these planes meet, polygons of both planes end in the same points. Both
+ends of the line are outside the solid. So the line is inside the solid between the first and the
+second point, between the third and the fourth, and so on.
 """
 
 from collections.abc import Sequence
@@ -15,16 +17,18 @@ from numpy.typing import NDArray
 
 from stereocell.meshes.validity import border
 
-Plane = tuple[int, float]  # the axis that it is across, and where
-_NEAR = 1e-4  # share of the surface's size within which a vertex is in a plane
+Plane = tuple[int, float]  # axis of the plane's normal (0: x), and the plane's coordinate
+_NEAR = 1e-4  # largest distance of a vertex from its plane, as a share of the surface's size
 
 
 def close_cuts(
     positions: NDArray[np.float64], triangles: NDArray[np.uint32], planes: Sequence[Plane]
 ) -> NDArray[np.uint32]:
-    """Return the triangles and those that close the openings; some stay open where it can't be.
+    """Add triangles that close the openings of a surface in some planes.
 
-    positions  float64 (n, 3), in the space in which tiles are cut along the axes
+    positions  float64 (n, 3), in a space where the tiles' faces are perpendicular to the axes
+
+    Returns all triangles, uint32 (m, 3). An opening whose edges form no loops stays open.
     """
     edges = border(triangles)
     if not len(edges):
@@ -34,7 +38,7 @@ def close_cuts(
     caps: list[NDArray[np.integer[Any]]] = [triangles]
     for axis, value in planes:
         is_in = (np.abs(positions[edges][..., axis] - value) < near).all(axis=1)
-        for side in (-1, 1):  # of the plane, on which the solid is
+        for side in (-1, 1):  # side of the plane on which the solid is
             away = positions[opposite, axis] - value
             rows = is_in & (np.sign(away) == side)
             if rows.any():
@@ -43,7 +47,7 @@ def close_cuts(
 
 
 def _third_corners(triangles: NDArray[np.uint32], edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the corner of each directed edge's triangle that is not on the edge."""
+    """Return, for each directed edge, the corner of its triangle that is opposite to the edge."""
     wide = triangles.astype(np.int64)
     all_edges = np.concatenate([wide[:, [0, 1]], wide[:, [1, 2]], wide[:, [2, 0]]])
     third = np.concatenate([wide[:, 2], wide[:, 0], wide[:, 1]])
@@ -56,9 +60,9 @@ def _third_corners(triangles: NDArray[np.uint32], edges: NDArray[np.int64]) -> N
 def _cap(
     positions: NDArray[np.float64], edges: NDArray[np.int64], axis: int, side: int
 ) -> NDArray[np.int64]:
-    """Return triangles that fill what directed edges bound in a plane; none where they don't."""
+    """Return triangles that fill the loops of directed edges in a plane; empty without loops."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
-    if side > 0:  # the cap faces down the axis
+    if side > 0:  # the normal of the cap points in the axis's negative direction
         first, second = second, first
     flat = positions[:, [first, second]]
     edges = np.concatenate([edges, _along_lines(flat, edges)])
@@ -71,7 +75,7 @@ def _cap(
 
 
 def _along_lines(flat: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the edges that join the ends of open chains along the lines on which they lie."""
+    """Return edges that join the ends of open chains, along the lines where two planes meet."""
     starts, ends = edges[:, 0], edges[:, 1]
     heads, tails = np.setdiff1d(ends, starts), np.setdiff1d(starts, ends)
     loose = np.concatenate([heads, tails])
@@ -95,7 +99,7 @@ def _along_lines(flat: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray
 
 
 def _loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Return closed chains of directed edges; what is no part of one is left out."""
+    """Return closed chains of directed edges. Edges that are in no closed chain are left out."""
     following: dict[int, list[int]] = {}
     for start, end in edges.tolist():
         following.setdefault(start, []).append(end)

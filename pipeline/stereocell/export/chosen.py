@@ -1,7 +1,7 @@
-"""What of a composed stage is exported: its channels, tiles and level, read a tile at a time.
+"""Select the channels, tiles and level of a composed stage that are exported, and read them.
 
-The stage is read as the bundle reads it, with all layers over it: surfaces that were edited by hand
-come with coarser levels made anew, and files that are damaged end the export.
+Tiles are read one at a time. The stage is read as for a bundle, with all layers over it. If a
+surface was edited by hand, its coarser levels are computed again. A damaged file ends the export.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,12 +37,13 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """The surface of a channel in a tile, world um, with what maps had at its vertices.
+    """The surface of a channel in a tile.
 
-    objects  of a label map's tile: `mesh.objects` counts in it
-    moved    the matrix (4, 4) for row vectors from its own space to the world, row by row: tiles
-             with the same fit each other
-    cuts     the faces of the tile's box, in its own space: the axis and where
+    mesh     in world um; values of maps are stored at its vertices
+    objects  objects of a label map's tile, which `mesh.objects` refers to
+    moved    the 16 numbers, row by row, of the matrix (4, 4) for row vectors from the tile's own
+             space to the world; tiles with the same matrix fit together
+    cuts     planes of the faces of the tile's box, in its own space: axis of the normal, coordinate
     """
 
     tile: str
@@ -55,7 +56,10 @@ class Piece:
 
     @property
     def object_names(self) -> list[str]:
-        """The names of a label map's objects, by their number in the tile."""
+        """The name of each object in the tile; empty without objects.
+
+        An object without a name is called after its channel and label.
+        """
         if self.objects is None:
             return []
         names = self.objects.names or ("",) * len(self.objects.labels)
@@ -93,7 +97,10 @@ class Chosen:
 
     @contextmanager
     def _loaded(self, name: str) -> Iterator[tuple[Usd.Prim, TileChoice]]:
-        """Yield a tile and what the stage selects of it, not what was selected to read it."""
+        """Yield a tile and its variants as the stage selects them.
+
+        Selections that were made to read a tile are removed afterwards.
+        """
         try:
             with loaded(self.stage, name, as_written=self.as_written) as found:
                 yield found
@@ -110,13 +117,14 @@ class Chosen:
 
     @property
     def label_maps(self) -> list[ComposedAppearance]:
-        """Return those of the chosen channels whose surfaces are objects."""
+        """Return the selected channels that are label maps."""
         return [one for one in self.channels if read_columns(self.stage, one.id) is not None]
 
     def show_as_viewer(self) -> None:
-        """Choose the channels that show at first, if no channel is named and any of them is drawn.
+        """Select only the channels that the viewer shows at opening, unless channels were named.
 
-        All of them would hide one another, or show through one another in patches.
+        All channels together would hide each other, or show through each other in patches. If the
+        viewer's channels have no surface, all channels stay selected.
         """
         every, shown = self.channels, [one for one in self.channels if one.opens]
         if self.options.channels or not shown or len(shown) == len(every):
@@ -130,7 +138,7 @@ class Chosen:
 
     @property
     def is_part(self) -> bool:
-        """Whether only some tiles or a region are written, and nothing that layers add."""
+        """Whether only some tiles or a region are exported; then additions are left out."""
         return bool(self.options.tiles) or self.region is not None
 
     @property
@@ -139,7 +147,10 @@ class Chosen:
 
     @property
     def box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return least and largest (x, y, z), world um, of the tiles within the region."""
+        """Return the corners (x, y, z), world um, of the tiles' box, clipped to the region.
+
+        Raises UsageError if the region does not overlap the tiles.
+        """
         low, high = (np.array([self.all_tiles[tile][end] for tile in self.tiles]) for end in (0, 1))
         box = low.min(axis=0), high.max(axis=0)
         if self.region is None:
@@ -151,12 +162,12 @@ class Chosen:
 
     @property
     def longest_um(self) -> float:
-        """Return the longest edge of the chosen part, um."""
+        """Return the longest edge of the exported part, um."""
         low, high = self.box
         return float((high - low).max())
 
     def describe_scale(self, scale: float) -> str:
-        """Return the physical size of the chosen part, and its size in a file at a scale."""
+        """Return words for the physical size of the exported part and its size in the file."""
         low, high = self.box
         size, shown = (describe_size((high - low) * one) for one in (1.0, scale))
         if scale != 1:
@@ -165,7 +176,10 @@ class Chosen:
         return f"life-size, {size}" + (f"; --scale {larger:.0f} enlarges it" if larger > 1 else "")
 
     def nothing(self, kind: str) -> UsageError | StageError:
-        """Return the error that no such thing is left: a region is told where there are some."""
+        """Return the error that nothing of a kind, such as a surface, is left to export.
+
+        If there is a region, the message states the box that a region may overlap.
+        """
         if self.region is None:
             return StageError(f"{self.path}: no {kind} is left to export")
         low, high = (np.array([self.all_tiles[tile][end] for tile in self.tiles]) for end in (0, 1))
@@ -174,9 +188,10 @@ class Chosen:
         return UsageError(f"--region: no {kind} is in it, expected a part of {box}")
 
     def count_triangles(self) -> list[int]:
-        """Return the triangles of the chosen tiles and channels at each level, finest first.
+        """Return the number of triangles of the selected tiles and channels at each level.
 
-        Of a region those within it, for which the surfaces are read.
+        The finest level is first. Triangles outside a region do not count if --max-triangles is
+        given. All surfaces must be read for that.
         """
         by_tile: list[list[int]] = []
         for name in self.tiles:
@@ -195,11 +210,12 @@ class Chosen:
         return sum(count_faces(prim) for prim in prims if prim is not None)
 
     def levels(self, *, light: int | None = None) -> list[int]:
-        """Return the levels to try, finest first: from --lod on, those within --max-triangles.
+        """Return the levels to try, finest first, that meet --lod and --max-triangles.
 
-        light  triangles that are enough if neither is given; a coarsest level of more is taken
+        light  largest number of triangles if neither option is given; if all levels have more, the
+               coarsest level is returned
 
-        Raises UsageError where no level is small enough, StageError where there is no surface.
+        Raises UsageError if no level is small enough, and StageError if there is no surface.
         """
         counts = self.count_triangles()
         if not any(counts):
@@ -221,10 +237,10 @@ class Chosen:
     def pieces(
         self, level: int, *, whole: bool = False, channel: str | None = None
     ) -> Iterator[Piece]:
-        """Yield the surfaces at a level, a tile after another.
+        """Yield the surfaces at a level, one tile after the other.
 
-        whole    of all tiles, and beyond the region: what a solid is cut from
-        channel  the ID of the one that is read; None: all that are chosen
+        whole    read all tiles and do not clip to the region, for solids that are cut later
+        channel  ID of the channel to read; None: all selected channels
         """
         tiles = list(self.all_tiles) if whole else self.tiles
         for number, name in enumerate(tiles, 1):
@@ -269,7 +285,7 @@ class Chosen:
     def _own_box(
         self, tile: Usd.Prim, channel: ComposedAppearance, matrix: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the corners of a tile's box before it was moved."""
+        """Return the corners (x, y, z) of a tile's box, um, in the tile's own space."""
         volume = read_volume(tile, channel.id)
         if volume is not None:
             return np.array(volume.low), np.array(volume.high)
@@ -277,7 +293,7 @@ class Chosen:
         return move_box(low, high, np.linalg.inv(matrix).astype(np.float64))
 
     def volumes(self) -> Iterator[tuple[str, ComposedAppearance, ComposedVolume]]:
-        """Yield the volumes, a tile after another."""
+        """Yield the volumes with their tile and channel, one tile after the other."""
         for number, name in enumerate(self.tiles, 1):
             with self._loaded(name) as (tile, _):
                 for channel in self.channels:
@@ -287,7 +303,7 @@ class Chosen:
             self.report(f"{number}/{len(self.tiles)} {name}")
 
     def tile_boxes(self) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Return where each visible tile is cut from its neighbours, world um."""
+        """Return the corners (x, y, z) of each visible tile, world um: neighbours meet there."""
         boxes = {}
         for name in self.all_tiles:
             with self._loaded(name) as (tile, _):

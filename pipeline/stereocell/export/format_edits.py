@@ -1,7 +1,7 @@
-"""Which edits of a stage a format leaves out, though a bundle takes them over.
+"""List the edits of a stage that a file format can't hold, although a bundle takes them over.
 
-The names are those of `usd/edit_table.py`. An export prints a line on each such edit, in the words
-of `bundle`; tests/export/test_format_edits.py compares the table with what the files have.
+Places and names are those of `usd/edit_table.py`. An export reports each of these edits in the same
+words as `bundle`. tests/export/test_format_edits.py compares the lists with real files.
 """
 
 from collections.abc import Iterator
@@ -22,14 +22,14 @@ Names = dict[str, tuple[str, ...]]  # place -> patterns of names
 
 @dataclass(frozen=True, slots=True)
 class Lack:
-    """A kind of edits that a format has no field for, and the reason, which follows the name."""
+    """A kind of edit that a format can't hold, and the reason that messages give."""
 
     reason: str
     names: Names
 
 
 _PARTS = ("specimen", "tiles", "tile", "branch", "mesh")
-# Values of a material beside its colour
+# Values of a material other than its colour
 _SHADING = {
     "UsdPreviewSurface": tuple(
         name
@@ -60,7 +60,7 @@ _VOLUMES = {
     "field": ("*",),
 }
 
-# Kinds that only USD and a bundle have
+# Edits that only USD and a bundle can hold
 _NOWHERE = (
     Lack("the file has no cameras", {"camera": (WHOLE,)}),
     Lack("the file has no names of tiles", {"tile": ("@displayName",)}),
@@ -114,9 +114,9 @@ OF_PRECOMPUTED = (*_OF_CHANNELS, _NO_MATERIALS, _NO_COLORS, _NO_SHOWN, _NO_FUNCT
 
 
 def left_out(lacks: tuple[Lack, ...], place: str, name: str) -> str:
-    """Return why a format leaves out an edit of a name at a place; empty: it has it.
+    """Return why a format leaves out an edit of a name at a place; empty: the format holds it.
 
-    `@specifier` stands for the whole prim: it has to be named, and `*` does not fit it.
+    The name `@specifier` stands for the whole prim. A `*` does not match it.
     """
     for lack in lacks:
         patterns = lack.names.get(place, ())
@@ -128,9 +128,12 @@ def left_out(lacks: tuple[Lack, ...], place: str, name: str) -> str:
 
 
 def notes_on_functions(stage: Usd.Stage, lacks: tuple[Lack, ...]) -> Iterator[str]:
-    """Yield a line on each channel whose transfer function a layer chooses, where none is kept."""
+    """Yield a message for each channel whose transfer function a user's layer selects.
+
+    Yields nothing if the format holds transfer functions.
+    """
     reason, built = left_out(lacks, "channel", "transferFunction"), BuiltLayers(stage)
-    session = stage.GetSessionLayer()  # readers select variants there
+    session = stage.GetSessionLayer()  # has the selections of readers, not of users
     for prim in stage.GetPrimAtPath(specimen_of(stage).channels).GetChildren() if reason else ():
         choosing = [
             spec.layer

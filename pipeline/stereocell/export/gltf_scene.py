@@ -1,8 +1,9 @@
-"""The whole specimen as one glTF file, metres, y up: a node a channel, below it one a tile.
+"""Write the specimen as one glTF file, in metres, y up.
 
-Of a label map each object is a node of its own, with its name, up to MAX_NODES of them; beyond
-that a tile's objects are one mesh, in their colours. Meshes and curves that layers add have a node
-of their own, unless only some tiles or a region are written.
+There is a node for each channel, and below it one for each tile. In a label map, each object has
+its own node with its name. If there would be more than MAX_NODES of them, the objects of a tile
+become one mesh with colours at vertices. Meshes and curves that layers add also have nodes, unless
+only some tiles or a region are exported.
 """
 
 import tempfile
@@ -26,12 +27,12 @@ from stereocell.usd.read_additions import read_additions
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import specimen_name
 
-_ADDED = "Added"  # node of the meshes and curves that layers add
-MAX_NODES = 5000  # objects; more of them take programs minutes to open
+_ADDED = "Added"  # name of the node above the meshes and curves that layers add
+MAX_NODES = 5000  # largest number of objects with nodes; programs take minutes to open more
 
 
 def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
-    """Write .glb or .gltf; return what is in it. Raises OutputError and StageError."""
+    """Write .glb or .gltf; return a sentence about it. Raises OutputError and StageError."""
     options = chosen.options
     scale = METERS_PER_UNIT * (options.scale or 1.0)
     with tempfile.TemporaryFile(dir=path.parent) as file:
@@ -73,9 +74,9 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def _of_one_color(mesh: Mesh, material: Material) -> tuple[Mesh, Material]:
-    """Return a mesh whose vertices have one colour without theirs, and a material that has it.
+    """Move the colour of a mesh from its vertices to its material, if all vertices have the same.
 
-    More programs show a material's colour than vertices'.
+    More programs show the colour of a material than colours of vertices.
     """
     if mesh.colors is None or (mesh.colors != mesh.colors[0]).any():
         return mesh, material
@@ -92,7 +93,7 @@ def _buffers(chosen: Chosen, file: BinaryIO, level: int) -> Buffers:
 
 
 def _parts(piece: Piece, is_split: bool) -> Iterator[tuple[str, Mesh, dict[str, str | int]]]:
-    """Yield the meshes of a piece: one, or one an object."""
+    """Yield name, mesh and extras of a whole piece, or of each object in it."""
     objects, mesh = piece.objects, piece.mesh
     if objects is None or mesh.objects is None or not is_split:
         yield f"{piece.channel.name} {piece.tile}", mesh, {}

@@ -1,11 +1,11 @@
-"""A folder for Neuroglancer, NAME.precomputed: the image, and surfaces as meshes of all levels.
+"""Write a folder for Neuroglancer, NAME.precomputed: the image, and surfaces at all levels.
 
-    image/    all channels with volumes, by scale
-    mesh/     a segment a channel: 1, 2, ...
-    CHANNEL/  of a label map: a segment an object, by its label
+    image/    all channels with volumes, at several scales
+    mesh/     one segment per channel: 1, 2, ...
+    CHANNEL/  for a label map: one segment per object; its ID is the label
 
-Voxel (0, 0, 0) spans 0 to 1 there. The format knows no turned volumes: of a turned specimen the
-image's own axes stay, and meshes are turned back onto them.
+In Neuroglancer, voxel (0, 0, 0) spans 0 to 1 along each axis. The format has no rotated volumes. So
+the image of a rotated specimen keeps its own axes, and meshes are rotated back onto them.
 """
 
 import tempfile
@@ -45,7 +45,7 @@ Surface = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
 
 def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
-    """Write the folder; return a line about it. Raises UsageError without DracoPy."""
+    """Write the folder; return a sentence about it. Raises UsageError without DracoPy."""
     draco = import_extra("DracoPy", extra="draco", wanted_by=path.suffix)
     path.mkdir()
     layout = find_layout(chosen) if _has_volumes(chosen) else None
@@ -80,9 +80,11 @@ def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
 
 @dataclass(slots=True)
 class _Found:
-    """The surfaces of a channel by segment and level, and names of a label map's segments.
+    """The surfaces of a channel.
 
-    The segment of a channel that is no label map is 0.
+    surfaces  by segment ID, for each level the surfaces of all tiles; the ID is 0 if the channel is
+              not a label map
+    names     name of each segment of a label map
     """
 
     surfaces: dict[int, list[list[Surface]]] = field(default_factory=dict)
@@ -106,7 +108,10 @@ def _gather(chosen: Chosen, channel_id: str, levels: int) -> _Found:
 
 
 def _level(parts: list[Surface], to_nm: NDArray[np.float64]) -> Level:
-    """Return surfaces of several tiles as one mesh; `to_nm`: (4, 4), of world um."""
+    """Join surfaces of several tiles to one mesh.
+
+    to_nm  matrix (4, 4) for column vectors, from world um to Neuroglancer's nm
+    """
     positions, triangles = weld(parts)
     places = positions.astype(np.float64) @ to_nm[:3, :3].T + to_nm[:3, 3]
     if np.linalg.det(to_nm[:3, :3]) < 0:
@@ -115,7 +120,7 @@ def _level(parts: list[Surface], to_nm: NDArray[np.float64]) -> Level:
 
 
 def _different(levels: list[Level]) -> list[Level]:
-    """Return the levels without those that repeat a finer one."""
+    """Return the levels, finest first, without those that repeat the triangles of a finer one."""
     kept = levels[:1]
     for level in levels[1:]:
         if len(level.triangles) < len(kept[-1].triangles):
@@ -128,7 +133,7 @@ def _has_volumes(chosen: Chosen) -> bool:
 
 
 def _places(chosen: Chosen, layout: Layout | None) -> NDArray[np.float64]:
-    """Return the matrix (4, 4) of world um to Neuroglancer's nm, where the image lies."""
+    """Return the matrix (4, 4) for column vectors from world um to nm in Neuroglancer's space."""
     to_source = np.eye(4)
     to_source[:3, :3] = places_of_world(chosen)
     if layout is None:
@@ -148,7 +153,10 @@ def _resolution(layout: Layout) -> tuple[float, float, float]:
 
 
 def _write_image(folder: Path, chosen: Chosen, layout: Layout) -> int:
-    """Write the image; return the number of its scales, each from the last, on disk."""
+    """Write the image; return the number of its scales.
+
+    Each scale is computed from the one before. They are stored in temporary files.
+    """
     with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
         file = Path(scratch) / "0"
         file.touch()
@@ -159,14 +167,17 @@ def _write_image(folder: Path, chosen: Chosen, layout: Layout) -> int:
             scales.append(_halved(*scales[-1], Path(scratch) / str(len(scales))))
         write_volume(folder, scales)
         count = len(scales)
-        del values, scales  # mapped files can't be removed everywhere
+        del values, scales  # some systems do not remove files that are still mapped
         return count
 
 
 def _halved(
     values: NDArray[Any], spacing: tuple[float, float, float], file: Path
 ) -> tuple[NDArray[Any], tuple[float, float, float]]:
-    """Return means of two voxels along each axis that isn't much coarser than the finest."""
+    """Return voxels at half the resolution, as means of two, and their spacing.
+
+    Axes whose spacing is much coarser than the finest one are not halved.
+    """
     factors = [
         2 if s < 1.5 * min(spacing) and n > 1 else 1
         for s, n in zip(spacing, values.shape[:0:-1], strict=True)

@@ -1,17 +1,17 @@
-"""What an export is asked for, and the formats that can do it."""
+"""The options of an export, and the box of `--region`."""
 
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 from stereocell.model.errors import UsageError
 
-SCALES = 1e-9, 1e9  # a kilometre is a micrometre, and the reverse
-WALLS_MM = 1e-6, 1e6
-UNITS_M = {"um": 1e-6, "mm": 1e-3, "m": 1.0}  # length of each unit in metres
+SCALES = 1e-9, 1e9  # range of --scale: from 1 km as 1 um to 1 um as 1 km
+WALLS_MM = 1e-6, 1e6  # mm, range of --wall-mm
+UNITS_M = {"um": 1e-6, "mm": 1e-3, "m": 1.0}  # metres, length of each unit
 
 
 class Region(NamedTuple):
-    """A box of the stage's world, um: least and largest (x, y, z)."""
+    """A box in the stage's world: least and largest (x, y, z), um."""
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
@@ -19,25 +19,26 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ExportOptions:
-    """What is exported, and how. None and empty: the format's own choice.
+    """The options of an export. With None or empty values, the format uses its default.
 
-    channels       by name or ID; empty: all that have what the format holds
-    tiles          by name; empty: all
-    lod            level of detail, 0: the finest; a tile that has fewer takes its coarsest
-    max_triangles  the finest level of at most as many is taken
-    max_bytes      the finest level is taken whose file is no larger
-    units          of the numbers in formats that state none
-    scale          lengths in the file for a length of the specimen
-    compress       meshopt or draco
-    components     a .3mf has an object a body, joined by components
-    occlusion      darken vertices by ambient occlusion
-    bits           of a voxel
-    unity          one channel, as UnityVolumeRendering's importers read it
-    wall_mm        what is thinner in print is named
-    width          pixels of a picture
-    max_mb         the most that a page in one file takes, millions of bytes
-    strict         an edit that the file does not have is an error
-    view           a link of the viewer: the view that a page opens with
+    channels       names or IDs of the channels; empty: all that the format can hold
+    tiles          names of the tiles; empty: all
+    lod            level of detail, 0: the finest; a tile with fewer levels uses its coarsest
+    max_triangles  largest number of triangles, which decides the level
+    max_bytes      largest size of the file in bytes, which decides the level
+    region         box that the content is clipped to
+    units          unit of the numbers in formats that do not state one
+    scale          length in the file / length of the specimen
+    compress       `meshopt` or `draco`
+    components     whether a .3mf has one object per body, joined by components
+    occlusion      whether vertices are darkened by ambient occlusion
+    bits           bits per voxel
+    unity          whether to write one channel for UnityVolumeRendering's importers
+    wall_mm        mm in print; thinner parts are reported
+    width          width of an image or a video, in pixels
+    max_mb         largest size of a page in one file, in millions of bytes
+    strict         whether an edit that the file can't hold is an error
+    view           link of the viewer with the view that a page shows at opening
     """
 
     channels: tuple[str, ...] = ()
@@ -68,12 +69,12 @@ class ExportOptions:
                 raise UsageError(f"{flag} is {value:g}, expected {least:g} to {most:g}")
 
     def given(self) -> set[str]:
-        """Return the names of the options that are given."""
+        """Return the names of the options that are not at their defaults."""
         return {field.name for field in fields(self) if getattr(self, field.name) not in (None, ())}
 
 
 def parse_region(text: str) -> Region:
-    """Return the box of `x0:x1,y0:y1,z0:z1` in um; an empty end means as far as there is anything.
+    """Return the box of a text `x0:x1,y0:y1,z0:z1` in um; an empty end is infinite.
 
     Raises UsageError.
     """

@@ -1,9 +1,12 @@
-"""Buffers of a glTF file that is a fifth as large, for programs that know an extension.
+"""Write compressed buffers of a glTF file, which becomes a fifth as large.
+
+Only programs that support an extension can read it:
 
     meshopt  EXT_meshopt_compression and KHR_mesh_quantization: three, Babylon, Unity's glTFast
     draco    KHR_draco_mesh_compression: three, Babylon, Blender, Cesium
 
-Vertices of all meshes lie on one lattice, as in formats/gltf.py: tiles stay without cracks.
+The vertices of all meshes lie on one lattice, as in formats/gltf.py, so there are no cracks between
+tiles.
 """
 
 import math
@@ -19,15 +22,18 @@ from stereocell.model.extra_packages import import_extra
 from stereocell.model.mesh import Mesh
 
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5121, 5123, 5125, 5126
-_STEPS = 1 << 16  # lattice steps along a specimen's longest edge: meshopt's 16 bits
+_STEPS = 1 << 16  # lattice points along the specimen's longest edge, since offsets have 16 bits
 _DRACO_BITS, _NORMAL_BITS = 18, 10
 _DRACO_TYPES = {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2}  # GeometryAttribute::Type of Draco
 
 
 def packed_buffers(name: str, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> Buffers:
-    """Return the buffers of a packing; `low_m`, `high_m`: the specimen's box, metres.
+    """Return buffers for a compression.
 
-    Raises UsageError where its library is not installed.
+    name           `meshopt` or `draco`
+    low_m, high_m  corners (x, y, z) of the specimen's box, metres
+
+    Raises UsageError if the library is not installed.
     """
     if name == "meshopt":
         return MeshoptBuffers(low_m, high_m)
@@ -35,12 +41,12 @@ def packed_buffers(name: str, low_m: NDArray[np.float64], high_m: NDArray[np.flo
 
 
 class MeshoptBuffers:
-    """Positions of 16 bits, offsets from a mesh's own corner of the lattice."""
+    """Buffers with 16-bit positions, which count from the lower corner of each mesh."""
 
     extensions: tuple[str, ...] = ("EXT_meshopt_compression", "KHR_mesh_quantization")
 
     def __init__(self, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> None:
-        edge = float((high_m - low_m).max()) * 1.05  # caps lie a voxel beyond the tiles
+        edge = float((high_m - low_m).max()) * 1.05  # caps lie one voxel outside the tiles
         self._step = 2.0 ** math.ceil(math.log2(edge / (_STEPS - 1)))
         self._buffers = CompressedBuffers()
 
@@ -76,7 +82,7 @@ class MeshoptBuffers:
 
 
 class DracoBuffers:
-    """One stream of Draco a mesh. Its accessors have no bytes of their own."""
+    """Buffers with one Draco stream per mesh. The accessors have no bytes of their own."""
 
     extensions: tuple[str, ...] = ("KHR_draco_mesh_compression",)
 
@@ -84,7 +90,7 @@ class DracoBuffers:
         draco = import_extra("DracoPy", extra="draco", wanted_by="--compress draco")
         self._encode, self._decode = draco.encode, draco.decode
         edge = float((high_m - low_m).max())
-        self._origin = low_m - 0.05 * edge  # caps lie a voxel beyond the tiles
+        self._origin = low_m - 0.05 * edge  # caps lie one voxel outside the tiles
         self._range = 1.1 * edge
         self._data = bytearray()
         self._views: list[dict[str, Any]] = []
@@ -93,7 +99,7 @@ class DracoBuffers:
     def add_mesh(
         self, mesh: Mesh, positions: NDArray[np.float64], colors: NDArray[np.uint8] | None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        # the lattice's step is one for all meshes, so a vertex of two tiles stays one place
+        # All meshes have the same lattice, so vertices that two tiles share stay equal.
         step = self._range / ((1 << _DRACO_BITS) - 1)
         places = (self._origin + np.rint((positions - self._origin) / step) * step).astype("<f4")
         stream = self._encode(
@@ -106,7 +112,7 @@ class DracoBuffers:
             normal_quantization_bits=_NORMAL_BITS,
             colors=None if colors is None else np.ascontiguousarray(colors),
         )
-        found = self._decode(stream)  # it has its own order, and may have joined or split vertices
+        found = self._decode(stream)  # Draco may reorder, join or split vertices
         start = len(self._data)
         self._data += stream + bytes(-len(stream) % 4)
         self._views.append({"buffer": 0, "byteOffset": start, "byteLength": len(stream)})

@@ -1,6 +1,6 @@
-"""A picture of the surfaces, .png, and a turntable of them, .mp4 and .webm.
+"""Write an image of the surfaces, .png, or a turntable video, .mp4 and .webm.
 
-Drawn as the report draws, without OpenGL: alike on every machine.
+They are drawn by the report's renderer, without OpenGL, so they are the same on every machine.
 """
 
 import subprocess
@@ -16,23 +16,23 @@ from stereocell.model.extra_packages import import_extra
 from stereocell.report.draw_scenes import draw_image
 from stereocell.textures.draw_meshes import Shape, turning_frame
 
-PICTURE_TRIANGLES = 2_000_000  # more do not show on 1600 pixels
-VIDEO_TRIANGLES = 200_000  # a frame of 31 000 takes .35 s of CPU, of 640 pixels
+PICTURE_TRIANGLES = 2_000_000  # largest number of triangles; more make no difference at 1600 pixels
+VIDEO_TRIANGLES = 200_000  # a frame with 31 000 triangles and 640 pixels takes 0.35 s of CPU time
 _PICTURE_WIDTH, _VIDEO_WIDTH = 1600, 640  # pixels
-_FRAMES, _FPS = 120, 24  # once round in 5 s
+_FRAMES, _FPS = 120, 24  # one turn takes 5 s
 _CODECS = {
     ".mp4": ["libx264", "-crf", "18", "-movflags", "+faststart"],
     ".webm": ["libvpx-vp9", "-crf", "28", "-b:v", "0"],
 }
-# several threads, the clock and the version of the program would make other bytes
+# These options give the same bytes each time: no threads, no time stamps, no version of ffmpeg.
 _SAME_BYTES = ["-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]
 
 
 def write_picture(chosen: Chosen, path: Path, level: int) -> str:
-    """Write .png; return a line about it."""
+    """Write .png; return a sentence about it."""
     width = chosen.options.width or _PICTURE_WIDTH
     shapes = list(_shapes(chosen, level))
-    # round what is there: a patient's box is often twice as large
+    # Frame the surfaces and not the tiles: a patient's box is often twice as large.
     low = np.min([shape.positions.min(axis=0) for shape in shapes], axis=0)
     high = np.max([shape.positions.max(axis=0) for shape in shapes], axis=0)
     frame = tuple(low.tolist()), tuple(high.tolist())
@@ -42,7 +42,7 @@ def write_picture(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def write_turntable(chosen: Chosen, path: Path, level: int) -> str:
-    """Write .mp4 or .webm; return a line about it. Raises UsageError without imageio-ffmpeg."""
+    """Write .mp4 or .webm; return a sentence about it. Raises UsageError without imageio-ffmpeg."""
     ffmpeg = import_extra("imageio_ffmpeg", extra="video", wanted_by=path.suffix)
     shapes = list(_shapes(chosen, level))
     size = _encode(chosen, path, shapes, ffmpeg.get_ffmpeg_exe())
@@ -50,11 +50,11 @@ def write_turntable(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def _encode(chosen: Chosen, path: Path, shapes: list[Shape], ffmpeg: str) -> tuple[int, int]:
-    """Draw the frames, each straight into ffmpeg; return their width and height."""
+    """Draw the frames and pass each to ffmpeg; return their width and height."""
     width = chosen.options.width or _VIDEO_WIDTH
     frame = turning_frame(*chosen.box)
     first = draw_image(shapes, frame, (width, width))
-    size = first.width // 2 * 2, first.height // 2 * 2  # of colours in fours
+    size = first.width // 2 * 2, first.height // 2 * 2  # yuv420p needs even sizes
     taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{_FPS}"]
     made = ["-an", "-pix_fmt", "yuv420p", "-c:v", *_CODECS[path.suffix.lower()], *_SAME_BYTES]
     command = [ffmpeg, "-y", "-loglevel", "error", *taken, "-i", "-", *made, str(path)]
@@ -70,7 +70,7 @@ def _encode(chosen: Chosen, path: Path, shapes: list[Shape], ffmpeg: str) -> tup
                     chosen.report(f"frame {number}/{_FRAMES}")
             encoder.stdin.close()
         except BrokenPipeError:
-            pass  # ffmpeg says why
+            pass  # ffmpeg stopped, and its last line becomes the error below
         printed = encoder.stderr.read().decode(errors="replace").strip()
     if encoder.returncode:
         last = printed.splitlines()[-1] if printed else f"exit code {encoder.returncode}"

@@ -1,8 +1,8 @@
-"""Closed solids for 3D printers and mesh programs: .stl, .3mf, .ply, .obj.
+"""Write closed solids for 3D printers and mesh programs: .stl, .3mf, .ply, .obj.
 
-A body a channel, all tiles united; of a label map a body an object. STL has no names: there all
-channels become one body, or they would be solid twice where they overlap. Lengths are scaled so
-that the specimen fits a hand, if --scale says nothing else.
+There is one body per channel, united from all tiles, or one per object of a label map. STL has no
+names, so all channels become one body there: separate ones would overlap. Without --scale, the
+specimen is scaled to the size of a hand.
 """
 
 import math
@@ -33,10 +33,10 @@ from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_provenance import has_caps
 from stereocell.usd.read_stage import specimen_name
 
-HAND_M = 0.1  # longest edge of a specimen in print, if no --scale is given
-UNIT = "mm"  # what slicers take numbers for that have no unit
-WALL_MM = 0.8  # two lines of the usual nozzle of 0.4 mm
-_MAX_TOLD = 8  # parts with thin bodies: of a label map there may be thousands
+HAND_M = 0.1  # m, size of a hand: limit for the specimen's longest edge without --scale
+UNIT = "mm"  # unit that slicers assume for numbers without a unit
+WALL_MM = 0.8  # mm, two lines of the usual nozzle of 0.4 mm
+_MAX_TOLD = 8  # parts with thin bodies that are reported; a label map may have thousands
 Color = tuple[float, float, float]
 
 
@@ -45,7 +45,7 @@ Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]  # positions and triangles
 
 @dataclass(slots=True)
 class _Surface:
-    """Meshes of tiles that fit each other, and where these were cut; see `Piece`."""
+    """Meshes of tiles that fit together, and the faces of these tiles; see `Piece`."""
 
     moved: tuple[float, ...]
     meshes: list[Mesh] = field(default_factory=list)
@@ -54,7 +54,12 @@ class _Surface:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """What becomes one body. `color`: linear RGB. Surfaces by label and by how tiles were moved."""
+    """The content of one body of the file.
+
+    channel   ID of the channel
+    color     linear RGB
+    surfaces  by label (None: not a label map) and by `Piece.moved`
+    """
 
     channel: str
     name: str
@@ -67,7 +72,7 @@ def _write_3mf(path: Path, bodies: Sequence[Body], title: str, options: ExportOp
     write_3mf(path, bodies, title=title, unit=unit, components=components)
 
 
-# Writers of bodies by ending, given the name of the specimen; a new format is a line
+# Functions that write bodies, by the file's ending; the text is the specimen's name
 _WRITERS: dict[str, Callable[[Path, Sequence[Body], str, ExportOptions], None]] = {
     ".stl": lambda path, bodies, _, asked: write_stl_file(path, bodies, unit=asked.units or UNIT),
     ".3mf": _write_3mf,
@@ -77,7 +82,10 @@ _WRITERS: dict[str, Callable[[Path, Sequence[Body], str, ExportOptions], None]] 
 
 
 def write_print(chosen: Chosen, path: Path, level: int) -> str:
-    """Write the solids; return a line about them. Raises StageError and OutputError."""
+    """Write the solids; return a line about them, and lines about thin bodies.
+
+    Raises StageError and OutputError.
+    """
     options = chosen.options
     scale = options.scale or _handy(chosen)
     unit = options.units or UNIT
@@ -118,7 +126,7 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def _handy(chosen: Chosen) -> float:
-    """Return 1, 2 or 5 times a power of ten, by which the specimen fits a hand."""
+    """Return the scale at which the specimen fits a hand: 1, 2 or 5 times a power of ten."""
     low, high = chosen.box
     most = HAND_M / (float((high - low).max()) * METERS_PER_UNIT)
     power = 10.0 ** math.floor(math.log10(most))
@@ -128,7 +136,10 @@ def _handy(chosen: Chosen) -> float:
 def _solids(
     chosen: Chosen, level: int, *, is_one: bool
 ) -> Iterator[tuple[_Part, manifold3d.Manifold]]:
-    """Yield the bodies; `is_one`: one of all."""
+    """Yield each part with its solid.
+
+    is_one  whether all channels become one solid
+    """
     boxes, is_capped = _boxes(chosen), has_caps(chosen.stage)
     found = []
     for part in _parts(chosen, level, is_one):
@@ -159,7 +170,7 @@ def _close(surface: _Surface, name: str, is_capped: bool) -> manifold3d.Manifold
 
 
 def _parts(chosen: Chosen, level: int, is_one: bool) -> Iterator[_Part]:
-    """Yield what becomes a body: a channel, or an object of a label map unless `is_one`."""
+    """Yield a part for each channel, or for each object of a label map unless `is_one`."""
     for channel in chosen.channels:
         parts: dict[int | None, _Part] = {}
         for piece in chosen.pieces(level, whole=True, channel=channel.id):
@@ -176,7 +187,7 @@ def _parts(chosen: Chosen, level: int, is_one: bool) -> Iterator[_Part]:
 
 
 def _meshes(piece: Piece) -> Iterator[tuple[int | None, str, Color, Mesh]]:
-    """Yield a piece's surface, or each object's: label, name, colour, mesh."""
+    """Yield label, name, colour and mesh of a piece's surface, or of each object in it."""
     mesh = piece.mesh
     if piece.objects is None or mesh.objects is None:
         yield None, "", piece.material.color, (mesh.positions, mesh.triangles)
@@ -191,19 +202,19 @@ def _meshes(piece: Piece) -> Iterator[tuple[int | None, str, Color, Mesh]]:
 
 
 def _color_of(piece: Piece) -> Color:
-    """Return the colour of a body: a channel's own, though vertices may have colours."""
+    """Return the colour of a body: the channel's if vertices have colours, else the material's."""
     return piece.channel.color if piece.mesh.colors is not None else piece.material.color
 
 
 def _boxes(chosen: Chosen) -> list[Corners]:
-    """Return the boxes that solids are cut to; none: they stay whole."""
+    """Return the boxes that solids are cut to, world um; empty: solids are not cut."""
     options = chosen.options
     if not options.tiles and options.region is None:
         return []
     all_boxes = chosen.tile_boxes()
     lows, highs = (np.array([box[end] for box in all_boxes.values()]) for end in (0, 1))
     low, high = lows.min(axis=0), highs.max(axis=0)
-    far = float((high - low).max())  # surfaces are closed a voxel beyond the outermost tiles
+    far = float((high - low).max())  # caps lie one voxel outside the outermost tiles
     boxes = []
     for name in chosen.tiles:
         start, end = all_boxes[name]

@@ -1,8 +1,8 @@
-"""One page in one file, .html: the viewer and the bundle at the finest levels that fit.
+"""Write the viewer and a bundle as one file, .html, at the finest levels that fit a limit of size.
 
-The page runs from a disk (file://) and asks no host for anything: its policy forbids it. Each file
-is a block of base64 in the document, by gzip where that is shorter; `scene.js` answers the viewer's
-requests from these blocks.
+The page runs from a disk (file://). Its policy forbids requests to any host. Each file of the
+viewer and the bundle is a block of base64 in the document, as gzip if that is shorter. `scene.js`
+answers the viewer's requests from these blocks.
 """
 
 from collections.abc import Callable
@@ -16,10 +16,10 @@ from stereocell.export.scene_files import Levels, SceneFiles
 from stereocell.model.errors import UsageError
 from stereocell.storage.atomic_write import write_bytes
 
-MAX_MB = 25.0
+MAX_MB = 25.0  # millions of bytes, default for --max-mb
 MB_BYTES = 1_000_000
 _SCRIPT = Path(__file__).with_name("scene.js")
-_LONGEST_VIEW = 16_000  # characters; the viewer's longest link has 8000
+_LONGEST_VIEW = 16_000  # characters; the viewer's links have at most 8000
 
 
 def write_scene(
@@ -30,13 +30,13 @@ def write_scene(
     max_mb: float = MAX_MB,
     view: str = "",
 ) -> str:
-    """Write the scene of a bundle; return a line that says which levels it holds.
+    """Write the scene of a bundle; return a sentence about its size and levels.
 
-    channels  by name or ID; empty: all
-    max_mb    the most that the file may take, millions of bytes
-    view      a link of the viewer, or its end from `#`; empty: as the bundle opens
+    channels  names or IDs of the channels; empty: all channels
+    max_mb    largest size of the file, in millions of bytes
+    view      link of the viewer to a view, or the part from `#` on; empty: the default view
 
-    Raises UsageError where the coarsest levels take more, OutputError for a damaged bundle.
+    Raises UsageError if the coarsest levels are too large, and OutputError for a damaged bundle.
     """
     opening = view_block(_view_of(view))
     files = SceneFiles(bundle, channels)
@@ -56,10 +56,11 @@ def write_scene(
 def _finest_that_fits(
     files: SceneFiles, render: Callable[[Levels], bytes], most: int
 ) -> tuple[bytes, Levels]:
-    """Return the document of at most so many bytes, and its levels.
+    """Return the finest document of at most `most` bytes, and its levels.
 
-    From the coarsest levels on, surfaces or volumes become finer by one level, whichever adds less,
-    until neither has a finer level that fits.
+    The search starts with the coarsest levels. In each step, either surfaces or volumes become
+    finer by one level: the kind whose next level is smaller. A kind stops when its next level does
+    not fit.
     """
     levels = Levels(max(0, files.surface_levels - 1), max(0, files.volume_levels - 1))
     document = render(levels)
@@ -84,7 +85,7 @@ def _finest_that_fits(
 
 
 def _about(files: SceneFiles, levels: Levels, size: int) -> str:
-    """Return one sentence: the levels that the file holds, and the parts that were left out."""
+    """Return a sentence about the size of a file, its levels, and the parts that were left out."""
     holds, out = [], []
     if files.surface_levels:
         holds.append(f"surfaces at lod{levels.surfaces}")
@@ -100,12 +101,12 @@ def _about(files: SceneFiles, levels: Levels, size: int) -> str:
 
 
 def _finer(count: int, of: str) -> list[str]:
-    """Return the words for levels that were left out; none where there are none."""
+    """Return a list with words for left-out levels; empty if there are none."""
     return [f"{count} finer level{'s' if count > 1 else ''} of {of}"] if count else []
 
 
 def _view_of(link: str) -> str:
-    """Return the end of a link, from `#` on. Raises UsageError for another text."""
+    """Return the part of a link from `#` on. Raises UsageError if it is not a link to a view."""
     if not link:
         return ""
     view = link[link.find("#") :]

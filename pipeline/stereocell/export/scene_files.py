@@ -1,7 +1,7 @@
-"""The files of a bundle at coarser levels, as a scene in one file holds them.
+"""Read the files of a bundle without its finer levels, for a scene in one file.
 
-A scene's bundle is a bundle like any other, with fewer levels: its lists name the files that are
-there, with their hashes. Surfaces keep the names of their levels, lod2.glb stays lod2.glb.
+The result is a complete bundle with fewer levels. Its lists have the remaining files with their
+hashes. Surfaces keep the names of their levels: lod2.glb stays lod2.glb.
 """
 
 import gzip
@@ -21,20 +21,20 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.file_list import encode, is_same, read_list, to_json
 from stereocell.storage.json_files import compact_json, read_json, sealed
 
-_PACKS = {".json", ".glb", ".bin", ".hdr"}  # the others are packed already
+_PACKS = {".json", ".glb", ".bin", ".hdr"}  # suffixes that gzip makes smaller
 _NO_USDZ = "left out of a scene in one file"
 
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """A file's bytes, by gzip or as they are."""
+    """The bytes of a file, as gzip or unchanged."""
 
     data: bytes
     is_packed: bool
 
 
 def pack(path: str, data: bytes) -> Packed:
-    """Return a file's bytes, by gzip where that is shorter; the same bytes each time."""
+    """Return a file's bytes, as gzip if that is shorter. The same input gives the same bytes."""
     if PurePosixPath(path).suffix in _PACKS:
         small = gzip.compress(data, 9, mtime=0)
         if len(small) < len(data):
@@ -44,16 +44,16 @@ def pack(path: str, data: bytes) -> Packed:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """The finest levels that are taken, 0: all. A tile that has fewer keeps its coarsest one."""
+    """The finest levels that are kept, 0: all levels. A tile always keeps its coarsest level."""
 
     surfaces: int
     volumes: int
 
 
 class SceneFiles:
-    """A bundle whose files are taken at some levels.
+    """The files of a bundle, with a selection of channels.
 
-    Raises OutputError where the bundle is damaged, UsageError for a channel that it does not have.
+    Raises OutputError if the bundle is damaged, and UsageError for an unknown channel.
     """
 
     def __init__(self, bundle: Path, channels: Sequence[str] = ()) -> None:
@@ -62,7 +62,7 @@ class SceneFiles:
         self._listed = read_list(self._root / FILES, REMEDY)
         self.channels = self._chosen(channels)
         self._packed: dict[str, Packed] = {}
-        self._trusted: set[str] = set()  # files whose hashes were compared
+        self._trusted: set[str] = set()  # paths of files whose hashes were found correct
 
     def _chosen(self, wanted: Sequence[str]) -> list[dict[str, Any]]:
         found = self._manifest["channels"]
@@ -74,12 +74,12 @@ class SceneFiles:
 
     @property
     def has_usdz(self) -> bool:
-        """Whether the bundle has a file for a phone's own room, which a page in one file lacks."""
+        """Whether the bundle has a specimen.usdz. A page in one file leaves it out."""
         return self._manifest.get("usdz") is not None
 
     @cached_property
     def _tilesets(self) -> dict[str, dict[str, Any]]:
-        """The tileset of each channel that has surfaces, with all levels in one document."""
+        """The tileset of each channel with surfaces. Nested tilesets are inlined."""
         refs = {one["id"]: one["tileset"] for one in self.channels if one["tileset"] is not None}
         return {id_: self._whole_tileset(ref["path"]) for id_, ref in refs.items()}
 
@@ -89,23 +89,23 @@ class SceneFiles:
 
     @property
     def surface_levels(self) -> int:
-        """The number of levels of the surfaces; 0: there are none."""
+        """The number of levels of the surfaces; 0: there are no surfaces."""
         roots = (tileset["root"] for tileset in self._tilesets.values())
         return max((lod + 1 for root in roots for _, lod in surfaces(root)), default=0)
 
     @property
     def volume_levels(self) -> int:
-        """The number of mip levels of the volumes; 0: there are none."""
+        """The number of mip levels of the volumes; 0: there are no volumes."""
         return max((len(one["levels"]) for one in self._volume_entries()), default=0)
 
     def largest_volume(self, levels: Levels) -> tuple[int, int, int]:
-        """Return the voxels (x, y, z) of the largest volume of a tile at the finest level taken."""
+        """Return the size in voxels (x, y, z) of the largest volume at its finest kept level."""
         sizes = [_kept(entry, levels.volumes)[0]["size"] for entry in self._volume_entries()]
         x, y, z = max(sizes, key=lambda size: (size[0] * size[1] * size[2], size))
         return x, y, z
 
     def least_bytes(self, levels: Levels) -> int:
-        """Return fewer bytes than the files take at some levels, without reading them."""
+        """Return a lower bound for the size of the files at some levels, without reading them."""
         frames = (
             level["length"]
             for entry in self._volume_entries()
@@ -116,10 +116,10 @@ class SceneFiles:
             for id_, tileset in self._tilesets.items()
             for uri, _ in surfaces(without_finer(tileset["root"], levels.surfaces))
         )
-        return sum(frames) + sum(meshes) // 4  # gzip does not make a quarter of a .glb
+        return sum(frames) + sum(meshes) // 4  # gzip shrinks a .glb to more than a quarter
 
     def at(self, levels: Levels) -> dict[str, Packed]:
-        """Return all files by path, packed: a bundle at some levels, and the viewer's lights."""
+        """Return all files by path: the bundle at some levels, and the viewer's environments."""
         made: dict[str, bytes | None] = {}
         manifest = {**self._manifest, "channels": [], "usdz": None, "usdz_reason": _NO_USDZ}
         for channel in self.channels:
@@ -141,11 +141,14 @@ class SceneFiles:
     def _channel(
         self, channel: dict[str, Any], levels: Levels
     ) -> tuple[dict[str, bytes | None], dict[str, Any]]:
-        """Return a channel's files, None for one that is as in the bundle, and its entry."""
+        """Return a channel's files by path, and its entry in the manifest.
+
+        The content is None for a file that does not differ from that of the bundle.
+        """
         id_, entry = channel["id"], dict(channel)
         files: dict[str, bytes | None] = {channel["lut"]["path"]: None}
         folder = f"channels/{id_}/"
-        external = f"{folder}*/finer.json"  # their content stands in the tileset
+        external = f"{folder}*/finer.json"  # nested tilesets, which are inlined in the tileset
         for path in self._listed:
             if fnmatch(path, external):
                 continue
@@ -171,7 +174,10 @@ class SceneFiles:
         return files, entry
 
     def _volume(self, volume: dict[str, Any], finest: int) -> tuple[dict[str, Any], bytes | None]:
-        """Return a volume's entry without the levels finer than `finest`, and its texture."""
+        """Return a volume's entry and texture without the levels finer than `finest`.
+
+        The texture is None if it does not differ from that of the bundle.
+        """
         kept = _kept(volume, finest)
         if len(kept) == len(volume["levels"]):
             return volume, None
@@ -189,7 +195,7 @@ class SceneFiles:
             yield from content["volumes"]
 
     def _whole_tileset(self, path: str) -> dict[str, Any]:
-        """Return a tileset with the tilesets that it names in their places."""
+        """Return a tileset in which nested tilesets are inlined."""
         content = self._json(path)
         folder = PurePosixPath(path).parent
         root = inlined(content["root"], lambda uri: self._json(f"{folder}/{uri}")["root"])
@@ -210,7 +216,7 @@ class SceneFiles:
         return self._packed[path]
 
     def _require(self, path: str) -> None:
-        """Raise OutputError unless a file is as the bundle's list has it."""
+        """Raise OutputError if a file is missing or differs from the bundle's list."""
         if path in self._trusted:
             return
         file = self._root / path

@@ -1,7 +1,7 @@
-"""Name what of a solid is too thin to be printed.
+"""Report the bodies of a solid that are too thin to be printed.
 
-A ray goes inwards from places all over a body's surface; its median length is how thick the body
-is. Slicers leave out what is thinner than the line that a nozzle draws.
+Rays go inwards from points all over a body's surface. Their median length is the body's thickness.
+Slicers leave out parts that are thinner than the line that a nozzle draws.
 """
 
 from collections.abc import Iterator
@@ -11,17 +11,20 @@ import numpy as np
 
 from stereocell.meshes.validity import label_components
 
-_RAYS = 33  # a body: an odd number, whose median is one of them
-_NAMED = 3  # bodies that are named with their places
-_MAX_BODIES = 500  # bodies that are measured, the smallest: large ones are thick
+_RAYS = 33  # rays per body; an odd number, so that the median is the length of one ray
+_NAMED = 3  # bodies whose places are reported
+_MAX_BODIES = 500  # bodies that are measured, smallest first; large ones are rarely thin
 
 
 def describe_thin(
     solid: manifold3d.Manifold, name: str, *, wall_um: float, um_per_mm: float, um_per_unit: float
 ) -> Iterator[str]:
-    """Yield a line where bodies of a solid are thinner than a wall.
+    """Yield a message if bodies of a solid are thinner than a wall.
 
-    Lengths are printed in mm, places in the file's unit: there they are looked up.
+    name         name of the solid in the message
+    wall_um      smallest thickness, um of the specimen
+    um_per_mm    um of the specimen per mm of the print; thicknesses are reported in mm
+    um_per_unit  um of the specimen per unit of the file; positions are reported in this unit
     """
     mesh = solid.to_mesh()
     positions = mesh.vert_properties[:, :3].astype(np.float64)
@@ -37,7 +40,7 @@ def describe_thin(
     bodies.sort(key=lambda rows: float(areas[rows].sum()))
     thin = []
     for rows in bodies[:_MAX_BODIES]:
-        # places that lie evenly over the area
+        # Choose triangles so that the rays are evenly distributed over the body's area.
         shares = (np.arange(_RAYS) + 0.5) / _RAYS * areas[rows].sum()
         picked = rows[np.searchsorted(np.cumsum(areas[rows]), shares).clip(max=len(rows) - 1)]
         picked = picked[areas[picked] > 0]

@@ -1,10 +1,12 @@
 """Make one closed solid of a channel's surfaces, which are open where tiles meet.
 
-Neighbouring tiles have the same vertices where they meet, bit by bit and at each level, and a
-surface is closed where the specimen ends (isosurface/extract.py). So the union of all tiles takes
-no boolean operation: equal places become one vertex. What is not wanted is cut off then, by solid
-boxes. Where a tile is hidden, or was moved, its neighbours are closed at the cut (cap.py), and
-moved tiles are united with the others by manifold3d.
+Neighbouring tiles have exactly the same vertices where they meet, at each level. Surfaces are
+closed at the faces of the whole block (isosurface/extract.py). So tiles need no boolean operation
+to be united: vertices at equal positions are merged. Tiles and parts that are not exported are cut
+off afterwards by boxes.
+
+If a tile is hidden or was moved, its neighbours are closed at the shared face (cap.py). Tiles that
+were moved are united with the others by manifold3d.
 """
 
 from collections.abc import Sequence
@@ -17,10 +19,11 @@ from numpy.typing import NDArray
 from stereocell.meshes.validity import border
 from stereocell.model.errors import StageError
 
-# share of a solid's size; shorter edges that an operation left are closed: as float32 their ends
-# could be one place, and other programs would find the solid open
+# Smallest length of an edge, as a share of a solid's size. Boolean operations leave shorter edges,
+# which are removed: both ends could be the same position in float32, and other programs would then
+# treat the solid as open.
 _HAIR = 1e-5
-# share of the shortest edge by which a box reaches into the next, or ends before its cut
+# Overlap of neighbouring boxes, and margin to a cut, as a share of the shortest edge of all boxes
 _REACH = 3e-4
 Corners = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -28,7 +31,7 @@ Corners = tuple[NDArray[np.float64], NDArray[np.float64]]
 def weld(
     parts: Sequence[tuple[NDArray[np.float32], NDArray[np.uint32]]],
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """Return the meshes as one with no two vertices alike, and no triangle without area."""
+    """Join meshes; merge vertices at equal positions, and drop triangles that collapse."""
     firsts = np.cumsum([0, *(len(positions) for positions, _ in parts)])
     places = np.concatenate([positions for positions, _ in parts]) + np.float32(0)  # no -0.0
     triangles = np.concatenate(
@@ -43,11 +46,11 @@ def weld(
 def to_solid(
     positions: NDArray[np.float32], triangles: NDArray[np.uint32], name: str
 ) -> manifold3d.Manifold:
-    """Return a closed mesh as a solid. Raises StageError where it is open or no surface."""
+    """Convert a closed mesh to a solid. Raises StageError if it is open or not a manifold."""
     mesh = manifold3d.Mesh(positions, triangles)
     solid = manifold3d.Manifold(mesh)
     if solid.status() != manifold3d.Error.NoError and mesh.merge():
-        solid = manifold3d.Manifold(mesh)  # vertices of open edges that were a hair apart
+        solid = manifold3d.Manifold(mesh)  # `merge` joined vertices of open edges that nearly met
     if solid.status() == manifold3d.Error.NoError:
         return solid
     edges = border(triangles)
@@ -61,11 +64,11 @@ def to_solid(
 
 
 def to_mesh(solid: manifold3d.Manifold) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """Return positions float32 (n, 3) and triangles uint32 (m, 3) of a solid.
+    """Return positions, float32 (n, 3), and triangles, uint32 (m, 3), of a solid.
 
-    No two vertices are at one place: those that float32 can't tell apart are joined, and where the
-    solid touches itself it is drawn in by a hair. Other programs join equal places, and would find
-    an edge of four triangles.
+    No two vertices have the same position. Vertices that are equal in float32 are merged. Where the
+    solid touches itself, they are moved slightly inwards instead, because other programs merge
+    equal positions and would get edges of four triangles.
     """
     found = solid.to_mesh()
     positions = np.ascontiguousarray(found.vert_properties[:, :3], np.float32)
@@ -79,7 +82,7 @@ def to_mesh(solid: manifold3d.Manifold) -> tuple[NDArray[np.float32], NDArray[np
 
 
 def _drawn_in(positions: NDArray[np.float32], triangles: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Return the positions, those that are the same moved against their own surface's normals."""
+    """Return the positions; equal ones are moved slightly inwards, against their normals."""
     _, number, counts = np.unique(positions, axis=0, return_inverse=True, return_counts=True)
     shared = np.flatnonzero(counts[number.ravel()] > 1)
     a, b, c = positions[triangles].astype(np.float64).transpose(1, 0, 2)
@@ -104,10 +107,11 @@ def unite(solids: Sequence[manifold3d.Manifold]) -> manifold3d.Manifold:
 
 
 def cut_to(solid: manifold3d.Manifold, boxes: Sequence[Corners]) -> manifold3d.Manifold:
-    """Return what of a solid lies in any of some boxes, which touch or lie apart.
+    """Return the part of a solid inside of boxes, which may touch each other.
 
-    Faces are moved inwards by a hair, since vertices lie on the planes where tiles meet: a cut
-    through a vertex leaves a solid that touches itself.
+    Vertices lie on the planes where tiles meet, and a cut through a vertex would give a solid that
+    touches itself. So outer faces of boxes are moved slightly inwards, and faces between two boxes
+    slightly outwards.
     """
     ends = [(low.copy(), high.copy()) for low, high in boxes]
     reach = _REACH * min(float((high - low).min()) for low, high in boxes)

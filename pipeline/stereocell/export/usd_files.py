@@ -1,8 +1,8 @@
-"""USD in one file: a light copy for viewers of augmented reality, or the stage flattened.
+"""Write USD in one file: a small copy for augmented reality, or the flattened stage.
 
-.usdz         surfaces at one level, the size of a hand, as the bundle has it (write_usdz.py)
-.usdc, .usda  all that the stage composes, without layers, payloads and variants: meshes at one
-              level, volumes, materials. Volumes and maps stay files of OUT, by relative paths
+.usdz         surfaces at one level, in the size of a hand, as in the bundle (write_usdz.py)
+.usdc, .usda  the composed stage without layers, payloads and variants: meshes at one level,
+              volumes, materials. It refers to the volumes and maps of OUT by relative paths
 """
 
 import os
@@ -24,7 +24,7 @@ from stereocell.usd.write_usdz import SIZE_M, write_usdz
 
 
 def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
-    """Write .usdz; return a line about it."""
+    """Write .usdz; return a sentence about it."""
     channels = [channel.id for channel in chosen.channels]
     tiles = chosen.tiles
     scale = chosen.options.scale
@@ -43,7 +43,7 @@ def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
-    """Write .usdc or .usda; return a line about it. Raises OutputError."""
+    """Write .usdc or .usda; return a sentence about it. Raises OutputError."""
     stage, specimen = chosen.stage, specimen_of(chosen.stage)
     kept = {channel.id for channel in chosen.channels}
     for name in chosen.tiles:
@@ -66,13 +66,13 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
             if one not in kept:
                 _remove(flat, place.AppendChild(one))
     stage.GetSessionLayer().Clear()
-    # a layer of an artist's may state none of these
+    # An artist's layer may not state these fields.
     flat.defaultPrim = specimen.top
     flat.pseudoRoot.SetInfo(UsdGeom.Tokens.metersPerUnit, METERS_PER_UNIT)
     flat.pseudoRoot.SetInfo(UsdGeom.Tokens.upAxis, UP_AXIS)
     if chosen.options.scale is not None:
         _enlarge(flat, specimen, chosen.options.scale)
-    # where the file will be: it is written in a folder beside its place
+    # `path` is in a temporary folder beside the file's final place.
     folder = path.parent.parent.resolve()
     UsdUtils.ModifyAssetPaths(flat, lambda asset: _relative(asset, folder))
     export(flat, path)
@@ -82,9 +82,9 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def _enlarge(flat: Sdf.Layer, specimen: Specimen, scale: float) -> None:
-    """Enlarge what is drawn below the specimen by transforms, and move the cameras away as much.
+    """Enlarge the content of the specimen by transforms, and move its cameras accordingly.
 
-    A transform above the cameras would leave their clipping ranges as they are.
+    One transform above all of them would not scale the clipping ranges of the cameras.
     """
     stage = Usd.Stage.Open(flat, Usd.Stage.LoadNone)
     root = stage.GetPrimAtPath(specimen.root)
@@ -96,7 +96,7 @@ def _enlarge(flat: Sdf.Layer, specimen: Specimen, scale: float) -> None:
 
 
 def _enlarge_below(prim: Usd.Prim, scale: float) -> None:
-    """Enlarge a prim where it can have a transform, else those below it."""
+    """Enlarge a prim if it can have a transform, or else its children."""
     if prim.IsA(UsdGeom.Camera):
         _move_camera(UsdGeom.Camera(prim), scale)
     elif prim.IsA(UsdGeom.Xformable):
@@ -123,7 +123,10 @@ def _move_camera(camera: UsdGeom.Camera, scale: float) -> None:
 
 
 def _keep_brightness(prim: Usd.Prim, scale: float) -> None:
-    """Let spheres of light shine as bright from farther away: those of a stated power."""
+    """Raise the intensity of sphere lights, so that they are as bright from farther away.
+
+    Only normalized lights need this. Others grow with their radius, which is scaled, too.
+    """
     for light in map(UsdLux.SphereLight, Usd.PrimRange(prim)):
         if light and light.GetNormalizeAttr().Get():
             intensity = light.GetIntensityAttr()
@@ -131,9 +134,9 @@ def _keep_brightness(prim: Usd.Prim, scale: float) -> None:
 
 
 def _state_colors(stage: Usd.Stage, flat: Sdf.Layer) -> None:
-    """Copy the edited colour of each material to its shader and to the meshes that it draws.
+    """Copy the edited colour of each material to its shader and to its meshes.
 
-    Many programs read only those.
+    Many programs read the colour only there.
     """
     for prim in stage.Traverse():
         edited = edited_color(prim) if prim.IsA(UsdShade.Material) else None
@@ -159,7 +162,7 @@ def _remove(layer: Sdf.Layer, path: Sdf.Path) -> None:
 
 
 def _relative(asset: str, folder: Path) -> str:
-    """Return a path as USD looks it up beside the layer."""
+    """Return an absolute path of an asset relative to a layer's folder; keep a relative one."""
     if not os.path.isabs(asset):
         return asset
     try:

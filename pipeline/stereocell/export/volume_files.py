@@ -1,4 +1,4 @@
-"""Volumes with spacing, origin, direction and channel names: .nrrd, .nii, .nii.gz, .raw."""
+"""Write volumes with spacing, origin, direction and channel names: .nrrd, .nii, .nii.gz, .raw."""
 
 import json
 from pathlib import Path
@@ -12,15 +12,15 @@ from stereocell.export.voxels import Layout, fill, find_layout, map_file
 from stereocell.formats.nrrd_write import nrrd_head
 from stereocell.model.errors import UsageError
 
-_UNITY_MOST = 2048  # voxels along an axis of Unity's 3D textures
-_NIFTI_MOST = 32767  # voxels along an axis, whose number has 16 bits
+_UNITY_MOST = 2048  # voxels, largest size of Unity's 3D textures along an axis
+_NIFTI_MOST = 32767  # voxels, largest size along an axis, which NIfTI stores in 16 bits
 _NIFTI_UNITS = {"um": "micron", "mm": "mm", "m": "meter"}
-_COMMENT = 6  # NIfTI's code of an extension that is a text
+_COMMENT = 6  # NIfTI's code for an extension that holds text
 _LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
 def write_nrrd(chosen: Chosen, path: Path, _: int) -> str:
-    """Write .nrrd with its voxels; return a line about them."""
+    """Write .nrrd; return a sentence about its voxels."""
     layout = _layout(chosen)
     head = nrrd_head(layout.grid, layout.dtype, layout.names)
     path.write_bytes(head)
@@ -29,7 +29,10 @@ def write_nrrd(chosen: Chosen, path: Path, _: int) -> str:
 
 
 def write_raw(chosen: Chosen, path: Path, _: int) -> str:
-    """Write the voxels alone, and beside them what they are: .nhdr, or Unity's .raw.ini."""
+    """Write .raw, which has only voxels, and a header file: .nhdr, or Unity's .raw.ini.
+
+    Returns a sentence about the voxels.
+    """
     layout = _layout(chosen)
     path.touch()
     fill(layout, chosen, map_file(path, layout, 0))
@@ -47,12 +50,12 @@ def write_raw(chosen: Chosen, path: Path, _: int) -> str:
 
 
 def described_by(path: Path, options: ExportOptions) -> Path:
-    """Return the path of the text beside a .raw that says how its voxels lie."""
+    """Return the path of the header file that describes a .raw."""
     return path.with_name(f"{path.name}.ini") if options.unity else path.with_suffix(".nhdr")
 
 
 def write_nifti(chosen: Chosen, path: Path, _: int) -> str:
-    """Write .nii or .nii.gz, channels along the fourth axis; return a line about them."""
+    """Write .nii or .nii.gz, with channels along the fourth axis; return a sentence about it."""
     layout = _layout(chosen)
     grid = layout.grid
     if max(grid.size) > _NIFTI_MOST:

@@ -1,8 +1,8 @@
-"""Put the volumes of all tiles together on the lattice that they share, on disk, tile by tile.
+"""Combine the volumes of all tiles to one volume on their common lattice, on disk, tile by tile.
 
-Axes are the source's: x to the right, y downwards, z from plane to plane, as a microscope or a
-scanner stored them. Places are the source's, too: the world's y, which grows upwards, is turned
-over again; a patient's are DICOM's (left, posterior, superior).
+Axes are those of the source, as a microscope or a scanner stored them: x to the right, y downwards,
+z from plane to plane. Positions are also those of the source. The world's y grows upwards, so it is
+reversed. For a patient, positions are DICOM's: (left, posterior, superior).
 """
 
 import os
@@ -25,21 +25,25 @@ from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_stage import sides_of
 from stereocell.usd.read_volume import ComposedVolume
 
-_OFF = 1e-2  # voxels by which a tile may lie beside the lattice of the first
-_IMAGE_AXES = np.diag([1.0, -1.0, 1.0])  # places in an image, of the world's
-_AS_BYTES = (0.0, 255.0)  # the window of 8-bit sources, of which the stage keeps these bytes alone
+_OFF = 1e-2  # voxels, largest distance of a tile from the lattice of the first tile
+_IMAGE_AXES = np.diag([1.0, -1.0, 1.0])  # matrix from the world's axes to those of an image
+_AS_BYTES = (0.0, 255.0)  # window of 8-bit sources: the stage's bytes then are the source's values
 
-_BLOCK = 1 << 20  # bytes of zeros that are written at a time
+_BLOCK = 1 << 20  # bytes, size of a block of zeros
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What a volume's file will hold.
+    """The content of a file with a volume.
 
-    first, size  voxels (x, y, z) on the lattice whose (0, 0, 0) is the first tile's first voxel
-    firsts       of each tile
-    is_measured  values are the source's; else the channel's window spans the whole type
-    is_upright   y grows upwards and z away from the viewer, as in Unity
+    grid         size, spacing, origin and direction of the volume
+    dtype        type of the voxels in the file
+    first        first voxel (x, y, z) of the volume on the common lattice, whose (0, 0, 0) is the
+                 first voxel of the first tile
+    firsts       first voxel (x, y, z) of each tile on the common lattice, by tile ID
+    is_measured  whether values are those of the source; else the channel's window is scaled to the
+                 whole range of the type
+    is_upright   whether y grows upwards and z away from the viewer, as in Unity
     """
 
     grid: VoxelGrid
@@ -56,13 +60,13 @@ class Layout:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """(channel, z, y, x)"""
+        """The shape of the volume: (channel, z, y, x)."""
         x, y, z = self.grid.size
         return len(self.channels), z, y, x
 
     @property
     def about(self) -> str:
-        """Return a line: size, channels, and what the values are."""
+        """A phrase about size, type, channels and values."""
         x, y, z = self.grid.size
         if self.is_measured:
             values = "the source's values"
@@ -73,10 +77,10 @@ class Layout:
 
 
 def find_layout(chosen: Chosen) -> Layout:
-    """Return how the chosen volumes lie together; the voxels are read for 16 bits.
+    """Find the common lattice of the selected volumes, and the type of the voxels.
 
-    Raises StageError where tiles lie on no common lattice or have no volumes, UsageError where the
-    options can't be.
+    All voxels are read to find the type, unless 8 bits are requested. Raises StageError if tiles
+    have no common lattice or no volumes, and UsageError for options that are not possible.
     """
     options = chosen.options
     bits = options.bits or (8 if options.unity else None)
@@ -124,7 +128,7 @@ def find_layout(chosen: Chosen) -> Layout:
 
 
 def fill(layout: Layout, chosen: Chosen, values: NDArray[np.generic]) -> None:
-    """Write the voxels, a tile after another, into an array (channel, z, y, x) of zeros."""
+    """Write the voxels into an array of zeros (channel, z, y, x), one tile after the other."""
     into = values[:, ::-1, ::-1] if layout.is_upright else values
     number = {channel.id: i for i, channel in enumerate(layout.channels)}
     size = np.array(layout.grid.size)
@@ -141,7 +145,10 @@ def fill(layout: Layout, chosen: Chosen, values: NDArray[np.generic]) -> None:
 
 
 def _place(volume: ComposedVolume) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the world's place of a tile's first voxel, and the steps along x, y and z (rows)."""
+    """Return the position of a tile's first voxel, and the steps along x, y and z as rows.
+
+    Both are in um of the world.
+    """
     low, high = np.array(volume.low), np.array(volume.high)
     spacing = (high - low) / (np.array(volume.size) - 2 * volume.apron - 1)
     turned = volume.matrix[:3, :3]
@@ -150,12 +157,12 @@ def _place(volume: ComposedVolume) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 class _Span:
-    """The values that 16 bits have to hold."""
+    """Finds the range of the values that 16 bits have to hold."""
 
     def __init__(self) -> None:
         self._low, self._high = np.inf, -np.inf
         self._are_whole = True
-        self.is_known = True  # the stage has the values
+        self.is_known = True  # whether the stage has measured values of all volumes so far
 
     def add(
         self,
@@ -182,7 +189,7 @@ class _Span:
 
     @property
     def are_whole(self) -> bool:
-        """Whether all values are whole numbers of 16 bits."""
+        """Whether all values are whole numbers that fit into 16 bits."""
         is_near = self._high - min(self._low, 0) <= 0xFFFF and self._low >= -0x8000
         is_signed = self._low < 0
         return self._are_whole and is_near and (not is_signed or self._high <= 0x7FFF)
@@ -195,7 +202,7 @@ class _Span:
 def _measured(
     channel: ComposedAppearance, volume: ComposedVolume, chosen: Chosen
 ) -> NDArray[np.float32] | NDArray[np.uint8] | None:
-    """Return the voxels as they were measured, without the apron; None: the stage has none."""
+    """Return the voxels as measured, without the apron; None: the stage does not keep them."""
     if volume.measured is not None:
         chosen.as_written.require(volume.measured)
         return _without_apron(read_measured(volume), volume)
@@ -231,10 +238,13 @@ def _cut(
     first: NDArray[np.int64],
     end: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Return the lattice's box of voxels whose centres lie in a region of the world; None: none.
+    """Return the voxels whose centres are in a region, as first and end (x, y, z) on the lattice.
 
-    Where the volumes lie turned in the world, as a scanner has a patient, it is the least box round
-    the region.
+    Returns None if there are none. If the volumes are rotated in the world, as a scan of a patient
+    may be, this is the smallest box of the lattice around the region.
+
+    start, steps  position of the lattice's (0, 0, 0), and its steps as rows, world um
+    first, end    voxels of all tiles on the lattice
     """
     if region is None:
         return first, end
@@ -250,12 +260,12 @@ def _cut(
 
 
 def _corners(low: NDArray[Any], high: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the eight corners of a box."""
+    """Return the eight corners (8, 3) of a box."""
     return np.array(list(product(*zip(low.tolist(), high.tolist(), strict=True))), np.float64)
 
 
 def places_of_world(chosen: Chosen) -> NDArray[np.float64]:
-    """Return the matrix (3, 3) of directions in the world to those of the source."""
+    """Return the matrix (3, 3) for column vectors from the world's axes to those of the source."""
     sides = sides_of(chosen.stage)
     if sides is None:
         return _IMAGE_AXES
@@ -277,7 +287,7 @@ def _grid(
 
 
 def _upright(layout: Layout) -> Layout:
-    """Return the layout with y and z from the other end: as Unity's axes, which are left-handed."""
+    """Return the layout with y and z reversed, for Unity's left-handed axes."""
     grid = layout.grid
     _, height, depth = grid.size
     columns = grid.direction * grid.spacing
@@ -287,17 +297,17 @@ def _upright(layout: Layout) -> Layout:
 
 
 def map_file(file: Path, layout: Layout, offset: int) -> NDArray[np.generic]:
-    """Return an array of zeros (channel, z, y, x) that lies in a file behind its head."""
+    """Map an array of zeros (channel, z, y, x) into a file, after a header of `offset` bytes."""
     return map_zeros(file, layout.dtype, layout.shape, offset=offset)
 
 
 def map_zeros(
     file: Path, dtype: np.dtype[Any], shape: tuple[int, ...], *, offset: int = 0
 ) -> NDArray[Any]:
-    """Return an array of zeros that lies in an existing file from a byte on.
+    """Map an array of zeros into an existing file, from byte `offset` on.
 
-    Its room on the disk is taken at once: a disk that is full when a mapped array is filled kills
-    the process. Raises OSError.
+    The disk space is allocated at once. Otherwise, if the disk became full while the mapped array
+    is filled, the system would kill the process. Raises OSError.
     """
     size = offset + int(np.prod(shape)) * np.dtype(dtype).itemsize
     with file.open("r+b") as opened:

@@ -1,4 +1,4 @@
-"""Write one file of a built OUT for another program: the format is chosen by the file's ending."""
+"""Export a built OUT to one file for another program. The file's ending selects the format."""
 
 import secrets
 import shutil
@@ -45,15 +45,18 @@ _LEVELS = frozenset({"strict", "tiles", "lod", "max_triangles", "max_bytes", "re
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How an ending is written, and the options that it takes beside --channels.
+    """How the files of an ending are written.
 
-    write        is given the level of detail, 0 where the format has none; returns a line about the
-                 file
-    triangles    the most that are wanted if nothing is said; a coarsest level of more is taken
-    lacks        the kinds of edits that it leaves out; None: it has all that the stage composes
-    is_seen      made to be looked at: without --channels it has those that the viewer opens with
-    names_files  names files of OUT by their paths, so OUT has to be a folder
-    beside       returns the paths of what goes with the file
+    write        writes the file at a level of detail (0 if the format has no levels), and returns a
+                 sentence about the file
+    takes        names of the options that the format accepts, besides --channels
+    lacks        kinds of edits that the format can't hold; None: it holds all composed content
+    triangles    largest number of triangles without --lod and --max-triangles; if all levels have
+                 more, the coarsest is written
+    is_seen      whether the format is for viewing; then, without --channels, it has the channels
+                 that the viewer shows at opening
+    names_files  whether the file refers to files of OUT by path, so that OUT must be a local folder
+    beside       returns the paths of files that belong to the file
     """
 
     write: Callable[[Chosen, Path, int], str]
@@ -100,7 +103,7 @@ FORMATS = {
         write_precomputed, frozenset({"strict", "tiles", "region", "bits"}), edits.OF_PRECOMPUTED
     ),
 }
-PAGE = ".html"  # of the bundle, where all others are of the stage
+PAGE = ".html"  # made from the bundle; all other formats are made from the stage
 PAGE_TAKES = frozenset({"max_mb", "view"})
 ENDINGS = (*FORMATS, PAGE)
 
@@ -113,10 +116,12 @@ def export(
     stage: Path | None = None,
     report: Report = lambda _: None,
 ) -> str:
-    """Write `file` from OUT's composed stage, or a layer over it; return a line about it.
+    """Write `file` from OUT's composed stage, or from a layer over it; return a sentence about it.
 
-    Raises UsageError for an ending or an option that can't be, StageError for a stage that can't be
-    read, OutputError where the file can't be written.
+    stage  the layer over the stage; None: the stage itself
+
+    Raises UsageError for an ending or option that is not possible, StageError if the stage can't be
+    read, and OutputError if the file can't be written.
     """
     out_folder = OutFolder(out)
     if find_ending(file) == PAGE:
@@ -132,7 +137,7 @@ def export(
         raise OutputError(
             f"{file.name}: it names files of OUT by their paths, expected OUT in a folder, or .usdz"
         )
-    files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
+    files = dependencies(path, out_folder.stage_dir)  # fails for files outside of these folders
     _require_outside(file, out_folder, files)
     ours = partial(is_own, out)
     line, made = _export(path, file, options=options, report=report, is_ours=ours)
@@ -143,9 +148,10 @@ def export(
 def export_stage(
     stage_path: Path, file: Path, *, options: ExportOptions, report: Report = lambda _: None
 ) -> str:
-    """Write `file` from a stage; return a line about it, and more of what is to be known.
+    """Write `file` from a stage; return a sentence about it, and further lines if needed.
 
-    The file is written whole or not at all, and has the same bytes each time. Raises as `export`.
+    The file is written completely or not at all. The same stage gives the same bytes. Raises the
+    same errors as `export`.
     """
     return _export(stage_path, file, options=options, report=report, is_ours=lambda _: False)[0]
 
@@ -158,9 +164,9 @@ def _export(
     report: Report,
     is_ours: Callable[[Path], bool],
 ) -> tuple[str, list[Path]]:
-    """Write `file` and the files that go with it; return a line about it, and all paths.
+    """Write `file` and the files that belong to it; return a sentence about it, and all paths.
 
-    is_ours  whether what lies at a path may be replaced unasked
+    is_ours  returns whether an existing file may be replaced
     """
     ending = find_ending(file)
     if ending == PAGE:
@@ -186,7 +192,7 @@ def _export(
 
 
 def _report_edits(chosen: Chosen, lacks: tuple[Lack, ...], ending: str) -> None:
-    """Report each edit that the file won't have. Raises StageError for one, with --strict."""
+    """Report each edit that the file will not have. With --strict, raises StageError instead."""
     stage, lost = chosen.stage, partial(edits.left_out, lacks)
     more = list(edits.notes_on_functions(stage, lacks))
     if not edits.left_out(lacks, "addition", WHOLE):
@@ -198,8 +204,8 @@ def _report_edits(chosen: Chosen, lacks: tuple[Lack, ...], ending: str) -> None:
 
 
 def _put_all_in_place(file: Path, beside: Path, is_ours: Callable[[Path], bool]) -> list[Path]:
-    """Move all that was written into a folder beside the file; return the final paths."""
-    # The parts beside the file are written first, so that a file that exists is complete.
+    """Move all files from the temporary folder to their final places; return their paths."""
+    # The file itself is moved last, so that all parts exist as soon as the file exists.
     made = sorted(beside.iterdir(), key=lambda one: one.name == file.name)
     places = [file.parent / one.name for one in made]
     for place in places:
@@ -212,7 +218,7 @@ def _put_all_in_place(file: Path, beside: Path, is_ours: Callable[[Path], bool])
 def _export_page(
     out_folder: OutFolder, file: Path, options: ExportOptions, *, is_staged: bool
 ) -> tuple[str, list[Path]]:
-    """Write a page of OUT's bundle; return a line about it, and its path."""
+    """Write a page of OUT's bundle; return a sentence about it, and its path."""
     if is_staged:
         raise UsageError(
             f"--stage can't be for {PAGE}, which holds the bundle: run `stereocell bundle OUT "
@@ -238,7 +244,7 @@ def _export_page(
 
 
 def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
-    """Write the file at the finest level that --max-bytes lets; return the line about it."""
+    """Write the file at the finest level that fits --max-bytes; return a sentence about it."""
     if not way.has_levels:
         return way.write(chosen, file, 0)
     most, size = chosen.options.max_bytes, 0
@@ -256,16 +262,17 @@ def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
 
 @contextmanager
 def _folder_beside(file: Path) -> Iterator[Path]:
-    """Yield an empty folder beside a file; one that a killed command left there is removed.
+    """Yield an empty temporary folder beside a file, and remove it afterwards.
 
-    Raises OutputError where the system refuses (rights, space).
+    Also removes folders that a killed command left. Raises OutputError if the file can't be
+    written, for example without permission or space.
     """
     clear_beside(file)
     folder = file.with_name(f".{file.name}.{secrets.token_hex(4)}.partial")
     try:
         folder.mkdir()
         yield folder
-    except OutputError as error:  # it knows the file by its temporary name
+    except OutputError as error:  # the message has the temporary name of the file
         raise OutputError(str(error).replace(str(folder / file.name), str(file))) from error
     except OSError as error:
         raise OutputError(f"{file}: can't be written: {error.strerror or error}") from error
@@ -274,7 +281,7 @@ def _folder_beside(file: Path) -> Iterator[Path]:
 
 
 def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -> None:
-    """Raise UsageError where FILE would take the place of what a build made, or of an edit."""
+    """Raise UsageError if the file would replace a file of the build or an artist's layer."""
     place = file.resolve()
     made = [out_folder.out / name for name in ("stage", "bundle", "units", "report")]
     if place in {one.resolve() for one in files} or any(
@@ -284,7 +291,7 @@ def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -
 
 
 def find_ending(file: Path) -> str:
-    """Return the ending by which a format is chosen. Raises UsageError for an unknown one."""
+    """Return the ending that selects the format. Raises UsageError if it is unknown."""
     name = file.name.lower()
     for ending in ENDINGS:
         if name.endswith(ending) and len(name) > len(ending):

@@ -1,7 +1,7 @@
-"""OUT/exports.json: the files that were exported from a build, with the hash of each.
+"""Keep OUT/exports.json, a list of the files that were exported from a build, with their hashes.
 
-Most formats have no field for the program and the specimen of a file. With this list an export
-replaces its own earlier file, and no file that another program wrote or that was edited since.
+Most formats can't store which program wrote a file. By this list, an export replaces its own
+earlier files, but no file that another program wrote or that was edited since.
 """
 
 import hashlib
@@ -16,15 +16,15 @@ from stereocell.storage.json_files import find_sealed, write_sealed
 
 
 def is_own(out: Path, file: Path) -> bool:
-    """Return whether a file or folder is unchanged since it was exported from OUT."""
+    """Return whether a file or folder was exported from OUT and is unchanged since."""
     found = find_sealed(OutFolder(out).exports_file, EXPORTS)
     return found is not None and found["files"].get(_key(file), "") == _digest(file)
 
 
 def remember(out: Path, files: Iterable[Path]) -> None:
-    """Add exported files to OUT's list; an OUT that can't be written has no list.
+    """Add exported files to OUT's list.
 
-    An OUT on object storage has no list either: an export only reads it.
+    Does nothing if OUT can't be written, or if it is on object storage, which an export only reads.
     """
     out_folder = OutFolder(out)
     if out_folder.is_stored:
@@ -42,7 +42,7 @@ def _key(file: Path) -> str:
 
 
 def _digest(path: Path) -> str:
-    """Return the SHA-256 of a file, or of the list of a folder's files."""
+    """Return the SHA-256 of a file or of the list of a folder's files, or `nothing` without it."""
     if path.is_dir():
         return hashlib.sha256(encode(list_files(path, root=path))).hexdigest()
     return str(measure(path)["sha256"]) if path.is_file() else "nothing"

@@ -1,12 +1,12 @@
 """Frame a specimen with three cameras: `mono`, and `left` and `right` for a stereo pair.
 
-They frame what shows: the surfaces of a head can fill a small part of a scan's box, more so if the
-scanner's gantry was tilted. The viewer frames a specimen likewise.
+They frame the visible content and not the whole box. For example, the surfaces of a head can fill a
+small part of a scan's box if the scanner's gantry was tilted. The viewer does the same.
 
-The viewer shows the specimen in a room, its longest edge 1.2 m; the cameras use the same scale. The
-distance between the eyes, 63 mm, shrinks by it. The eyes look straight ahead, parallel; their
-windows are shifted so that both see the specimen's centre at the same place (off-axis stereo, no
-keystone distortion).
+The viewer scales the specimen to a longest edge of 1.2 m. The cameras use the same scale, so the
+distance between the eyes, 63 mm, is divided by it. Both eyes look straight ahead, in parallel.
+Their image windows are shifted so that both see the specimen's centre at the same place (off-axis
+stereo, no keystone distortion).
 
 USD states lens numbers in tenths of a stage unit: millimetres become mm * 0.01 / metersPerUnit.
 
@@ -23,7 +23,7 @@ ROOM_SIZE_M = 1.2  # m, the specimen's longest edge in the viewer's room
 PUPIL_DISTANCE_M = 0.063
 FOCAL_LENGTH_MM = 35.0
 APERTURE_MM = (36.0, 20.25)  # (width, height), 16:9
-MARGIN = 1.08  # distance as a multiple of the one at which the specimen fills the frame
+MARGIN = 1.08  # camera distance, as a multiple of that at which the specimen fills the frame
 
 
 def define_cameras(
@@ -34,18 +34,20 @@ def define_cameras(
     group: Sdf.Path = CAMERAS,
     unit_m: float = METERS_PER_UNIT,
 ) -> None:
-    """Define the cameras, seen from +z. Boxes are lower and upper corners (x, y, z), in the world.
+    """Define the cameras, which look along -z.
 
-    box     (2, 3), of all that the stage has; the cameras stand in front of it
-    shown   (2, 3), of what shows; the cameras frame it
-    group   the prim above the cameras
-    unit_m  metres in a unit of the stage
+    box     (2, 3), lower and upper corner (x, y, z) of all content, in the world; the cameras
+            stand in front of it
+    shown   (2, 3), the same corners of the visible content, which the cameras frame
+    group   path of the cameras' parent prim
+    unit_m  length of a stage unit, in metres
     """
     lens = 0.01 / unit_m  # mm -> tenths of a stage unit
     width, height, depth = (float(v) for v in shown[1] - shown[0])
     eye = 0.5 * PUPIL_DISTANCE_M * float((box[1] - box[0]).max()) / ROOM_SIZE_M
     across, upwards = (0.5 * a / FOCAL_LENGTH_MM for a in APERTURE_MM)
-    # the front of what shows fills the frame first; half an eye distance keeps it in both frames
+    # The front face is nearest and decides the distance. `eye`, half the distance between the eyes,
+    # widens it so that both eyes see it whole.
     to_front = MARGIN * max((width / 2 + eye) / across, height / 2 / upwards)
     centre = shown.mean(axis=0)
     distance = max(to_front + depth / 2, MARGIN * float(box[1, 2] - centre[2]))

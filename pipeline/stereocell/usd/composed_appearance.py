@@ -1,4 +1,4 @@
-"""How a composed stage draws a channel, as plain values."""
+"""A channel's appearance in a composed stage, as plain values."""
 
 from dataclasses import dataclass
 
@@ -15,11 +15,11 @@ from stereocell.model.channel import (
 
 @dataclass(frozen=True, slots=True)
 class StatedLevel:
-    """Where a surface was made, see model.channel.SurfaceLevel.
+    """The level at which a surface was extracted; see model.channel.SurfaceLevel.
 
-    iso           voxel values above the background
-    background    its least and largest value; None: there is none
-    smoothing_um  sigma of the Gaussian
+    iso           level above the background, in voxel values
+    background    smallest and largest value of the background; None: the background is 0
+    smoothing_um  sigma of the Gaussian that smoothed the voxels, in um
     """
 
     iso: float
@@ -29,18 +29,18 @@ class StatedLevel:
 
 @dataclass(frozen=True, slots=True)
 class ComposedAppearance:
-    """One channel as the stage draws it; see model.channel.Appearance.
+    """The appearance of one channel in the stage; see model.channel.Appearance.
 
-    window         the voxel values to be shown as 0 and 1
-    volume_window  those that are 0 and 1 in the stage's volumes: `window` unless it was edited
-    surface        whether there is one, and whether it is to be trusted
-    surface_reason  why there is none, or why it is unsure; or empty
-    level          where the surface lies above the background, which is left out here but for its
-                   ends; None: not stated
-    chosen         a transfer function
-    transfer_2d    those functions that are two-dimensional
-    threshold      where the body begins, in voxel values; None: it is not known
-    opens          whether the channel shows when the specimen is opened
+    window          voxel values that are shown as 0 and 1
+    volume_window   voxel values that are stored as 0 and 1 in the stage's volumes; equal to
+                    `window` unless an edit changed that
+    surface         whether the channel has a surface, and whether the surface can be trusted
+    surface_reason  why there is no surface, or why it is uncertain; else empty
+    level           level of the surface above the background; None: not stated
+    chosen          name of the selected transfer function
+    transfer_2d     the two-dimensional transfer functions
+    threshold       voxel value at which the specimen begins; None: not known
+    opens           whether the channel is visible when the specimen is opened
     """
 
     id: str
@@ -60,17 +60,17 @@ class ComposedAppearance:
 
     @property
     def iso_normalized(self) -> float | None:
-        """The iso-value on the window's scale; outside 0..1 where the window leaves it out."""
+        """The iso-value on the window's scale; outside 0..1 if it lies outside the window."""
         return normalized(self.iso_value, self.window)
 
     @property
     def threshold_normalized(self) -> float | None:
-        """The threshold on the window's scale, 0..1: one beyond its ends is drawn at the end."""
+        """The threshold on the window's scale, clipped to 0..1."""
         share = normalized(self.threshold, self.window)
         return None if share is None else min(max(share, 0.0), 1.0)
 
     def window_voxels(self, voxels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return a volume of the stage, uint8 by `volume_window`, as uint8 by `window`."""
+        """Convert voxels, uint8, from the scale of `volume_window` to that of `window`."""
         if self.window == self.volume_window:
             return voxels
         first, last = self.volume_window

@@ -1,4 +1,4 @@
-"""Which prims of a composed stage are drawn, and where they stand in the world."""
+"""Find out whether a prim of a composed stage is drawn, and where it stands in the world."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,8 @@ from stereocell.usd.read_attributes import require_still
 from stereocell.usd.specimen import specimen_of
 from stereocell.usd.typed_values import one_line
 
-_PERSPECTIVE = 1e-9  # largest deviation of an affine matrix's last column
-_PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)  # of what a final picture shows
+_PERSPECTIVE = 1e-9  # largest deviation of a matrix's last column from (0, 0, 0, 1)
+_PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)  # purposes of prims in a final image
 FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 
@@ -28,9 +28,9 @@ def drawn(tile: Usd.Prim, path: object) -> Usd.Prim | None:
 
 
 def is_visible(prim: Usd.Prim) -> bool:
-    """Return whether neither a prim nor one above it is hidden, or is a guide or a stand-in.
+    """Return whether a prim is drawn: not a guide or a proxy, and not hidden by any ancestor.
 
-    A channel that does not show at first is none that is hidden: a bundle has it all the same.
+    A channel that is only off when the specimen opens counts as visible: a bundle includes it.
     """
     imageable = UsdGeom.Imageable(prim)
     if imageable.ComputePurpose() not in _PURPOSES:
@@ -42,7 +42,7 @@ def is_visible(prim: Usd.Prim) -> bool:
 
 
 def _is_hidden(prim: Usd.Prim) -> bool:
-    """Return whether a prim is hidden by another opinion than that on its channel's SHOWN prim."""
+    """Return whether a prim is hidden for another reason than its channel's SHOWN prim."""
     visibility = UsdGeom.Imageable(prim).GetVisibilityAttr()
     if not visibility or visibility.Get() != UsdGeom.Tokens.invisible:
         return False
@@ -55,7 +55,8 @@ def _is_hidden(prim: Usd.Prim) -> bool:
 def to_world(prim: Usd.Prim) -> NDArray[np.float64]:
     """Return the matrix (4, 4) from a prim's space to the world, for row vectors.
 
-    Raises StageError where it is flat or infinite, has a perspective, or leads too far away.
+    Raises StageError if the matrix is singular or infinite, has a perspective, moves farther than
+    FARTHEST_UM, or changes over time.
     """
     for path in prim.GetPath().GetAncestorsRange():
         for op in UsdGeom.Xformable(prim.GetStage().GetPrimAtPath(path)).GetOrderedXformOps():

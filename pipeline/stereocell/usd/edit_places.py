@@ -1,4 +1,4 @@
-"""Where in a stage an opinion stands: the names of places that `edit_table` uses."""
+"""Name the kind of place of each prim in a stage, as the keys of `edit_table` name it."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -21,7 +21,7 @@ _READER = "UsdPrimvarReader"
 
 
 class Places:
-    """The places of a stage's prims.
+    """Finds the place of a prim, such as `tile` or `mesh`.
 
     bound  paths of the materials that a layer binds
     """
@@ -36,7 +36,7 @@ class Places:
         self._drawn: dict[Sdf.Path, dict[Sdf.Path, str]] = {}
 
     def of(self, path: Sdf.Path) -> str:
-        """Return the place of a prim; empty: it is none that the stage's readers look at."""
+        """Return the place of a prim; empty: the stage's readers ignore the prim."""
         paths = self._paths
         if path == paths.root:
             return "specimen"
@@ -77,7 +77,7 @@ class Places:
         return "field" if len(names) == 4 and names[2] == f"{leaf}_volume" else ""
 
     def _of_shading(self, prim: Usd.Prim) -> str:
-        """Return the place of a material, or of a shader that draws one."""
+        """Return the place of a material or of a shader in it; empty: nothing uses the material."""
         material = _material_over(prim)
         if material is None or not self._is_used(material):
             return ""
@@ -92,7 +92,7 @@ class Places:
         return is_channels or path.HasPrefix(self._paths.tiles) or path in self._bound
 
     def _shaders(self, material: Usd.Prim) -> dict[Sdf.Path, str]:
-        """Return the shaders that draw a material's surface, and their IDs."""
+        """Return the IDs of the shaders that feed a material's surface, by path."""
         path = material.GetPath()
         if path not in self._drawn:
             surface, _, _ = UsdShade.Material(material).ComputeSurfaceSource()
@@ -111,7 +111,7 @@ class Places:
         return self._drawn[path]
 
     def feeds_shader(self, attribute: Usd.Attribute) -> bool:
-        """Return whether an input of a material gives a value that the bundle takes over."""
+        """Return whether an input of a material feeds a shader input that the bundle takes over."""
         material = _material_over(attribute.GetPrim())
         shaders = self._shaders(material) if material is not None else {}
         for path in shaders:
@@ -135,7 +135,7 @@ def read_primvars(mesh: Usd.Prim) -> Iterator[str]:
     """Yield the names of the primvars of a tile's mesh that its objects or its material use."""
     if is_single(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("displayOpacity")):
         yield "displayOpacity"
-    with suppress(StageError):  # the reader of the mesh raises it
+    with suppress(StageError):  # reading the mesh reports the same error
         surface = surface_of(mesh)
         yield from vertex_values_of(surface)
         if shows_display_color(surface):

@@ -1,10 +1,11 @@
-"""Which edits of a stage a bundle takes over: one table of places and names.
+"""The edits of a stage that a bundle takes over: one table of places and names.
 
-The readers of a composed stage read these opinions and no others. `find_lost_edits` compares the
-opinions of an artist's layers with the table, and reports every other one. A reader that reads a
-new name adds it here; tests/bundle/test_edit_table.py tries each kind of row.
+The readers of a composed stage read only these opinions. `find_lost_edits` compares the opinions of
+an artist's layers with the table and reports those that are missing in it. If you make a reader
+read a new name, add the name here. tests/bundle/test_edit_table.py tests each kind of row.
 
-A name that begins with `@` is a prim's metadata, any other one is a property. Both may have `*`.
+A name that begins with `@` is metadata of a prim; any other name is a property. `*` matches any
+text.
 """
 
 from fnmatch import fnmatchcase
@@ -34,7 +35,7 @@ _SHAPE = (
     "normals",
     "primvars:normals*",
 )
-# A display colour or opacity holds for all meshes below the prim.
+# Display colour and opacity: all meshes below the prim inherit them
 _DISPLAYED = ("primvars:displayColor*", "primvars:displayOpacity*")
 
 TAKEN: dict[str, tuple[str, ...]] = {
@@ -97,7 +98,8 @@ TAKEN: dict[str, tuple[str, ...]] = {
         HIDDEN,
     ),
     "shown": ("visibility",),
-    # the window's shape decides what shows at the sides, and nothing is clipped
+    # Programs always write horizontalAperture and clippingRange. They need no report although they
+    # have no effect: the window's shape decides the horizontal field of view.
     "camera": (
         *_PLACED,
         *_SHOWN,
@@ -135,14 +137,14 @@ TAKEN: dict[str, tuple[str, ...]] = {
         "inputs:opacityThreshold",
         "inputs:emissiveColor",
     ),
-    # inputs that are taken over from an image or a primvar alone
+    # These inputs are taken over only if an image or a primvar feeds them.
     "UsdPreviewSurface, fed": ("inputs:normal", "inputs:occlusion"),
     "UsdUVTexture": ("info:id", "outputs:*", "inputs:file", "inputs:st"),
     "UsdPrimvarReader": ("info:id", "outputs:*", "inputs:varname"),
 }
 
-# The build writes these from other values of the stage, and the bundle makes them anew: place ->
-# name -> what to edit instead; empty: an edit of a mesh rightly brings it along
+# Values that the bundle computes again from other values of the stage, as place -> name -> the
+# attribute to edit instead. Empty: programs write the value with any edit, so it needs no report.
 DERIVED: dict[str, dict[str, str]] = {
     "specimen": {"extentsHint": ""},
     "channel": {
@@ -161,10 +163,10 @@ DERIVED: dict[str, dict[str, str]] = {
     "addition": {"extent": ""},
 }
 
-# Values that hold in a bundle whatever a layer says: to state them changes nothing
+# Values that every bundle has: a layer that states them changes nothing
 ASSUMED: dict[str, object] = {"subdivisionScheme": "none", "doubleSided": True}
 
-# Reasons for opinions that nothing reads, by name; the first that fits is stated
+# Reasons why a name is not read, as (pattern, reason); the first pattern that matches counts
 REASONS: tuple[tuple[str, str], ...] = (
     (
         "model:*",
@@ -192,7 +194,7 @@ REASONS: tuple[tuple[str, str], ...] = (
     ("@displayName", "the bundle has no name for this prim"),
 )
 
-# Reasons for prims that a layer adds, by type; the first whose name the type's begins with or is
+# Reasons why an added prim is lost; the key is its type, or the end of it, as in SphereLight
 ADDED: dict[str, str] = {
     "Light": "the viewer's lamps are distant lights, spheres and domes",
     "Volume": "it is no volume of a channel in a tile",
@@ -202,10 +204,10 @@ ADDED: dict[str, str] = {
 
 
 def is_taken(place: str, name: str) -> bool:
-    """Return whether the bundle takes over an opinion of a name at a place."""
+    """Return whether the bundle takes over edits of this name at this place."""
     return any(fnmatchcase(name, pattern) for pattern in TAKEN.get(place, ()))
 
 
 def reason_of(name: str) -> str:
-    """Return why nothing reads a name; empty: the name is not known at all."""
+    """Return why no reader uses a name; empty: the name is not in REASONS."""
     return next((reason for pattern, reason in REASONS if fnmatchcase(name, pattern)), "")

@@ -1,8 +1,8 @@
 """The common part of every layer of a stage: units, root prim, export to disk.
 
-USD never rescales between layers, so each layer states micrometres, Y up and its default prim.
-Importing this module registers the codeless API schema of schemas/usd with USD, which reads its
-schemas once, when the first stage of a process opens.
+USD does not convert units between layers, so each layer states micrometres, Y up and its default
+prim. Importing this module registers the codeless API schemas of schemas/usd. This must happen
+before a process opens its first stage, since USD reads its schemas only then.
 """
 
 import hashlib
@@ -16,21 +16,21 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing
 
-METERS_PER_UNIT = 1e-6  # a stage unit is 1 um
+METERS_PER_UNIT = 1e-6  # metres: a stage unit is 1 um
 UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
-# A class that the root of each stage inherits: one edit for all specimens of a scene
+# A class that the root of each stage inherits. An edit of it changes all specimens of a scene.
 BROADCAST = Sdf.Path("/__class__").AppendChild(ROOT.name)
-# on /Specimen: the plane that it opens cut by, as its normal (x, y, z) and its offset, um, world
+# Attribute of /Specimen: the clip plane at opening, as normal (x, y, z) and offset, um, world
 OPENING_CUT = "stereocell:openingCut"
-# on /Specimen: lengths in display.usda for a length of the specimen, see usd/write_display.py
+# Attribute of /Specimen: scale of the specimen in display.usda, see usd/write_display.py
 DISPLAY_SCALE = "stereocell:displayScale"
-PAINTED_BY = "stereocell:paintedBy"  # on a channel's prim: ID of the channel that is painted on it
-BUILT_COLOR = "stereocellBuiltColor"  # custom data of a surface's colour: the colour of the build
+PAINTED_BY = "stereocell:paintedBy"  # on a channel: ID of the channel whose intensity it shows
+BUILT_COLOR = "stereocellBuiltColor"  # custom data of a surface's colour: its colour after a build
 CHANNELS = ROOT.AppendChild("Channels")
-# a prim for each channel, from which its surfaces and volumes in all tiles inherit the visibility
+# Parent of one prim per channel: its surfaces and volumes in all tiles inherit its visibility
 SHOWN = ROOT.AppendChild("Shown")
-CLASSES = ROOT.AppendChild("Classes")  # by channel: materials of its objects' classes
+CLASSES = ROOT.AppendChild("Classes")  # for each channel, the materials of its object classes
 TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")
 LIGHTS = ROOT.AppendChild("Lights")
@@ -40,14 +40,14 @@ PATIENT_API = "StereoCellPatientAPI"
 SURFACE_API = "StereoCellSurfaceAPI"
 LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
 
-# where the patient's sides are, on the group of the tiles: directions (x, y, z) among its own axes
+# Attributes of the tiles' group: directions (x, y, z) to the patient's sides, along its own axes
 SIDES = {
     "left": "stereocell:left",
     "posterior": "stereocell:posterior",
     "superior": "stereocell:superior",
 }
 
-# attributes of a surface's mesh
+# Attributes of a surface's mesh
 SHAPE_HASH = "stereocell:shapeHash"
 DISTANCE = "stereocell:distance"
 LARGEST_DISTANCE = "stereocell:largestDistance"
@@ -57,9 +57,9 @@ Plug.Registry().RegisterPlugins(str(find_asset("schemas/usd")))
 
 
 def new_stage(suffix: str, default_prim: str) -> Usd.Stage:
-    """Return a stage in memory with one layer, its units and the name of its root prim.
+    """Return a stage in memory with one layer that states units, up axis and default prim.
 
-    Payloads stay unloaded: their files need not exist yet.
+    Payloads are not loaded, so their files need not exist yet.
     """
     layer = Sdf.Layer.CreateAnonymous(suffix)
     layer.defaultPrim = default_prim
@@ -70,8 +70,8 @@ def new_stage(suffix: str, default_prim: str) -> Usd.Stage:
 
 
 def is_layer(file: Path) -> bool:
-    """Return whether USD can open a file as a layer; the file is read anew from the disk."""
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD prints pages about a damaged layer
+    """Return whether USD can open a file as a layer. Reads the file, never USD's cache."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # hides USD's long output on a damaged layer
     try:
         return Sdf.Layer.OpenAsAnonymous(str(file)) is not None
     except Tf.ErrorException:
@@ -81,7 +81,7 @@ def is_layer(file: Path) -> bool:
 
 
 def export(layer: Sdf.Layer, path: Path) -> None:
-    """Write a layer, whole or not at all. Raises OutputError where it can't be written."""
+    """Write a layer atomically: on failure, no partial file is left. Raises OutputError."""
     with replacing(path) as temporary:
         try:
             written = layer.Export(str(temporary))
@@ -101,7 +101,7 @@ def set_attribute(
 
 
 def hash_shape(mesh: UsdGeom.Mesh) -> str:
-    """Return a hash of a composed mesh's points and faces; empty where they aren't numbers."""
+    """Return a hash of a composed mesh's points and faces; empty if they are not numbers."""
     digest = hashlib.sha256()
     faces = mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
     for attribute, kind in ((mesh.GetPointsAttr(), "<f4"), *((one, "<i4") for one in faces)):
@@ -115,11 +115,11 @@ def hash_shape(mesh: UsdGeom.Mesh) -> str:
 
 
 def vec3f(points: ArrayLike) -> Vt.Vec3fArray:
-    """Return (n, 3) numbers of any dtype as USD's array of float32."""
+    """Convert an array (n, 3) of any dtype to USD's array of float32 vectors."""
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, dtype=np.float32))
 
 
 def vec3d(point: ArrayLike) -> Gf.Vec3d:
-    """Return three numbers (x, y, z) as USD's vector of float64."""
+    """Convert three numbers (x, y, z) to USD's vector of float64."""
     x, y, z = (float(v) for v in np.asarray(point))
     return Gf.Vec3d(x, y, z)

@@ -1,9 +1,9 @@
 """Walk the opinions that a user's layers add over a built stage.
 
-All layers of a composition count: the layer that was opened, its sublayers, and those that
-references, payloads and inherits bring in. The layers that a build wrote are left out. They are
-known by the layer of the stage's contents, which has the channels' appearances as a sublayer. A
-flattened stage has no such layer: there, edits can't be told from what was built.
+All layers of the composition are examined: the opened layer, its sublayers, and layers that come
+in by references and payloads. Layers that a build wrote are left out. Their folder is found by
+contents.usda, which has the channels' appearances as a sublayer. A flattened stage has no such
+layer, so it is not possible to distinguish its edits from the build.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from stereocell.usd.write_stage import SUBLAYERS
 from stereocell.usd.write_tile import LAYER_NAME
 from stereocell.usd.written_files import CONTENTS_NAME, NVINDEX_NAME, STAGE_NAME
 
-# How prims are composed: USD itself consumes these fields
+# Fields that USD itself uses when it composes prims
 _COMPOSITION = frozenset(
     (
         "specifier",
@@ -36,26 +36,27 @@ _COMPOSITION = frozenset(
         "permission",
     )
 )
-# Notes for those who read the layer, and what its editor shows of it
+# Notes for readers of the layer, and hints for the display in editors
 _NOTES = frozenset(("documentation", "comment", "hidden", "userDocBrief", "uiHints"))
-# Variant sets of the build: the readers of a stage select each variant
+# Variant sets of the build. The readers of a stage read all variants, not only the selected one.
 _ALL_READ = frozenset(("lod", "representation", "transferFunction"))
-BELOW_INSTANCE = "@below an instance"  # names an opinion that USD ignores
-# All prims, those of instances too
+BELOW_INSTANCE = "@below an instance"  # name of an opinion that USD ignores, below an instance
+# All prims, including those of instances
 _EVERY = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
 _DEFINED = Usd.TraverseInstanceProxies(
     Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
-)  # loaded or not
+)  # prims whether or not their payloads are loaded
 
 
 @dataclass(frozen=True, slots=True)
 class Opinion:
-    """An opinion of one layer, where it is composed.
+    """An opinion of one layer, and the composed prim that it applies to.
 
-    prim     the path of the composed prim
-    name     of the property, or of the prim's metadata behind an `@`
-    spec     the property or the prim in the layer
-    variant  the variant that holds it, if that one is not selected; else empty
+    prim         path of the composed prim
+    name         name of the property, or `@` and the name of the prim's metadata
+    spec         the property or the prim in the layer
+    variant      the variant that holds the opinion, if no reader sees that variant; else empty
+    is_unlisted  whether the layer does not list the variant set, so that USD ignores the variant
     """
 
     prim: Sdf.Path
@@ -66,12 +67,12 @@ class Opinion:
 
     @property
     def source(self) -> tuple[str, str]:
-        """The layer and the place there, with the name of metadata."""
+        """The layer, and the opinion's path and name in it: a key for the opinion."""
         return self.spec.layer.identifier, f"{self.spec.path} {self.name}"
 
 
 class BuiltLayers:
-    """Which layers of a stage a build wrote."""
+    """The layers of a stage that a build wrote; false if there are none."""
 
     def __init__(self, stage: Usd.Stage) -> None:
         self._folders = {
@@ -97,9 +98,9 @@ class BuiltLayers:
 
 
 def load_payloads_of_users(stage: Usd.Stage) -> None:
-    """Load the payloads that layers of a user add, and the tiles below which one has anything.
+    """Load the payloads that a user's layers add, and the tiles below which they state anything.
 
-    USD composes nothing below a payload that is not loaded, or below a prim that it defines.
+    USD does not compose prims below a payload that is not loaded.
     """
     built = BuiltLayers(stage)
     if all(layer in built for layer in _layers(stage)):
@@ -111,9 +112,10 @@ def load_payloads_of_users(stage: Usd.Stage) -> None:
 
 
 def defined_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """Yield all prims that are active and defined, those of instances and payloads too.
+    """Yield all active and defined prims, including those of instances and of users' payloads.
 
-    Prototypes of instancers stand nowhere. Payloads of users stay loaded.
+    Prims below a PointInstancer are left out: prototypes have no place of their own. Payloads that
+    users add stay loaded.
     """
     load_payloads_of_users(stage)
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), _DEFINED))
@@ -132,7 +134,7 @@ def _is_touched_below(prim: Usd.Prim, built: BuiltLayers) -> bool:
 
 
 def opinions_of_users(stage: Usd.Stage, built: BuiltLayers) -> Iterator[tuple[Usd.Prim, Opinion]]:
-    """Yield each opinion that a layer adds, with the composed prim, whose tile is then loaded."""
+    """Yield each opinion of a user's layer with its composed prim, while its tile is loaded."""
     if all(layer in built for layer in _layers(stage)):
         return
     for prim in _composed_prims(stage, built):
@@ -153,7 +155,7 @@ def _specs_of_users(prim: Usd.Prim, built: BuiltLayers) -> list[Sdf.PrimSpec]:
 
 
 def _load(stage: Usd.Stage, path: Sdf.Path) -> None:
-    """Load a payload and those below it, except that no tile is loaded by what holds all tiles."""
+    """Load a payload and those below it. A payload above the tiles does not load the tiles."""
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # the readers raise USD's errors
     is_above = specimen_of(stage).tiles.HasPrefix(path)
     stage.Load(path, Usd.LoadWithoutDescendants if is_above else Usd.LoadWithDescendants)
@@ -161,7 +163,7 @@ def _load(stage: Usd.Stage, path: Sdf.Path) -> None:
 
 
 def _composed_prims(stage: Usd.Stage, built: BuiltLayers) -> Iterator[Usd.Prim]:
-    """Yield all prims, of tiles only those that a user's layer touches, loaded one by one."""
+    """Yield all prims, except of tiles without edits. Loads the edited tiles one by one."""
     tiles = specimen_of(stage).tiles
     for path in stage.FindLoadable():
         if not _is_in_tile(path, tiles):
@@ -212,7 +214,7 @@ def _opinions(spec: Sdf.PrimSpec, prim: Usd.Prim, built: BuiltLayers) -> Iterato
 
 
 def _is_listed(prim: Usd.Prim, path: Sdf.Path, name: str, built: BuiltLayers) -> bool:
-    """Return whether a spec at a place lists a variant set: else USD ignores its variants there."""
+    """Return whether a user's layer lists a variant set at a path; if not, USD ignores the set."""
     specs = [spec for spec in _specs_of_users(prim, built) if spec.path == path]
     return any(name in spec.variantSetNameList.GetAppliedItems() for spec in specs)
 
@@ -235,7 +237,7 @@ def _own_opinions(spec: Sdf.PrimSpec, path: Sdf.Path, variant: str) -> Iterator[
 
 
 def _states_value(prop: Sdf.PropertySpec) -> bool:
-    """Return whether a property has a value, a connection or a target, and is not only declared."""
+    """Return whether a property has a value, connections or targets and is not only declared."""
     if isinstance(prop, Sdf.RelationshipSpec):
         return prop.HasInfo("targetPaths")
     return bool({"default", "timeSamples", "spline", "connectionPaths"} & set(prop.ListInfoKeys()))

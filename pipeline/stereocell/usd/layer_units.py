@@ -1,7 +1,7 @@
-"""Hold the units, the up axis and the default prim of the layers over a stage against the stage's.
+"""Check that layers over a stage have the same units, up axis and default prim as the stage.
 
-USD takes them from the layer that is opened, and never from its sublayers. Without them, other
-programs take the numbers for centimetres.
+USD reads these fields from the opened layer and not from its sublayers. If the opened layer lacks
+them, other programs interpret the numbers as centimetres.
 """
 
 from collections.abc import Iterator
@@ -14,11 +14,11 @@ from stereocell.usd.layer import METERS_PER_UNIT, UP_AXIS
 from stereocell.usd.specimen import specimen_of
 from stereocell.usd.written_files import DISPLAY_NAME, STAGE_NAME
 
-_FALLBACK_UNIT = 0.01  # metres: USD's unit where a layer states none
+_FALLBACK_UNIT = 0.01  # metres: USD's unit if a layer states none
 
 
 def lines_for(stage: Usd.Stage) -> dict[str, str]:
-    """Return the line that states each field of a layer over a stage, by the field."""
+    """Return the line to write into a layer over a stage for each field, by field name."""
     return {
         UsdGeom.Tokens.metersPerUnit: "metersPerUnit = 1e-6",
         UsdGeom.Tokens.upAxis: f'upAxis = "{UP_AXIS}"',
@@ -29,9 +29,9 @@ def lines_for(stage: Usd.Stage) -> dict[str, str]:
 def require_units(stage: Usd.Stage) -> None:
     """Raise StageError for a layer that states another unit, up axis or default prim.
 
-    Every layer of the stack counts, sublayers of sublayers too: USD rescales and turns none. A
-    payload's layer is not looked at. The default prim is that of the stage's root layer alone:
-    other programs open no other.
+    All sublayers are checked, also nested ones, since USD neither scales nor turns them. Layers of
+    payloads are not checked. The default prim is checked in the root layer only, since other
+    programs read it there.
     """
     lines, top = lines_for(stage), specimen_of(stage).top
     for layer in stage.GetLayerStack(includeSessionLayers=False):
@@ -44,9 +44,9 @@ def require_units(stage: Usd.Stage) -> None:
 
 
 def require_no_display(stage: Usd.Stage) -> None:
-    """Raise StageError where a layer lies over `display.usda`, or a scene references it.
+    """Raise StageError if the stage uses `display.usda` as a sublayer or a reference.
 
-    That file is in metres and enlarges the stage, so none of its numbers are those of a bundle.
+    That file is in metres and enlarges the stage, so its numbers do not fit those of a bundle.
     """
     for layer in stage.GetUsedLayers():
         path = Path(layer.realPath)
@@ -59,9 +59,9 @@ def require_no_display(stage: Usd.Stage) -> None:
 
 
 def _wrong_fields(layer: Sdf.Layer, top: str) -> Iterator[tuple[str, str, str, str]]:
-    """Yield the fields that a layer states wrongly: name, value, expected value, effect.
+    """Yield the wrong fields of a layer: name, value, expected value and effect of the mistake.
 
-    top  name of the default prim; empty: any
+    top  expected name of the default prim; empty: any name
     """
     root = layer.pseudoRoot
     unit, axis = UsdGeom.Tokens.metersPerUnit, UsdGeom.Tokens.upAxis
@@ -80,7 +80,7 @@ def _leads_to(default_prim: str, top: str) -> bool:
 
 
 def note_missing(stage: Usd.Stage) -> str:
-    """Return a line on the fields that a stage's root layer lacks; empty: it states them all."""
+    """Return a message on the fields that a stage's root layer lacks; empty: it has them all."""
     layer, known = stage.GetRootLayer(), lines_for(stage)
     lacks = [field for field in known if not layer.pseudoRoot.HasInfo(field)]
     if not lacks:

@@ -1,10 +1,11 @@
-"""Find the opinions of a user's layers that no bundle takes over, and say why.
+"""Find the opinions of a user's layers that a bundle does not take over, and the reason for each.
 
-The walk (`layer_opinions`) yields all opinions over the built stage, and the table (`edit_table`)
-has those that the readers take over. All others are lost, except an opinion that repeats the
-stage's own value. Values over time of what would be taken over are refused.
+`layer_opinions` yields all opinions over the built stage. `edit_table` lists those that the readers
+take over. All others are lost edits, except an opinion that repeats the stage's own value. An
+animated value at a place that would be taken over is an error.
 
-A file for other programs has less than a bundle. Its format states what more is lost: `LeftOut`.
+Files for other programs contain less than a bundle. Their formats add reasons by a `LeftOut`
+function.
 """
 
 from collections import defaultdict
@@ -31,19 +32,20 @@ from stereocell.usd.specimen import specimen_of
 
 _BINDING = "material:binding"
 _COLLECTION = "collection:"
-# Places whose own binding is the strongest, and groups of such places
+# Places where a material's binding needs no strength: no stronger binding lies below them
 _OWN_BINDING = ("mesh", "addition", "group")
-_MOST_LINES = 3  # of edits that are alike; the last line counts the others
-_GROUPS = ("Xform", "Scope", "")  # types of prims that only hold others
+_MOST_LINES = 3  # largest number of similar edits with a line each; more of them share one line
+_GROUPS = ("Xform", "Scope", "")  # types of prims that only group other prims
 _FLAT = (
     "flattened, so edits that no bundle takes over can't be found: export a layer over stage.usda "
     "instead"
 )
-_BUILT = "built"  # place of a prim of the build that no reader looks at
+_BUILT = "built"  # place of prims that the build wrote and that no reader uses
 
 
-WHOLE = "@specifier"  # stands for a prim as a whole
-# Given a place and a name of `edit_table`, why a file has no such thing; empty: it has it
+WHOLE = "@specifier"  # name that stands for the prim as a whole
+# Takes a place and a name of `edit_table`, and returns why a file format leaves that out; empty:
+# the format has it
 LeftOut = Callable[[str, str], str]
 
 
@@ -52,19 +54,19 @@ def _nothing(_place: str, _name: str) -> str:
 
 
 class _Fate(Enum):
-    """The reason why an opinion needs no line."""
+    """The reason why an opinion is not reported."""
 
-    TAKEN = 1
-    COVERED = 2  # by the line on its prim
+    TAKEN = 1  # the bundle takes it over
+    COVERED = 2  # a line about its prim, or about prims below a group, is enough
 
 
 @dataclass(frozen=True, slots=True)
 class LostEdit:
     """An edit that no bundle takes over.
 
-    what    the prim, with the property or the field
-    name    of the property or the field; edits of one name and reason are alike
-    reason  why it is lost
+    what    the prim with the property or the metadata, in the words of the message
+    name    name of the property or the metadata; edits of one name and reason are similar
+    reason  why the edit is lost
     """
 
     what: str
@@ -73,7 +75,7 @@ class LostEdit:
 
 
 def describe(lost: Iterable[LostEdit]) -> Iterator[str]:
-    """Yield a line for each edit; edits that are alike share lines where they are many."""
+    """Yield a line for each edit; more than three similar edits share one line."""
     groups: dict[tuple[str, str], list[LostEdit]] = defaultdict(list)
     for edit in lost:
         groups[edit.name, edit.reason].append(edit)
@@ -86,7 +88,7 @@ def describe(lost: Iterable[LostEdit]) -> Iterator[str]:
 
 
 def notes_on_edits(stage: Usd.Stage, left_out: LeftOut = _nothing) -> Iterator[str]:
-    """Yield a line on each edit that is lost. Raises StageError for an edit over time."""
+    """Yield a line on each lost edit. Raises StageError for an animated value."""
     built = BuiltLayers(stage)
     if built:
         yield from describe(find_lost_edits(stage, built, left_out))
@@ -101,10 +103,10 @@ def require_no_lost_edit(
     left_out: LeftOut = _nothing,
     taker: str = "no bundle takes over",
 ) -> None:
-    """Raise StageError where an edit is lost, or where that can't be found.
+    """Raise StageError if an edit is lost, or if the stage is flattened, which hides its edits.
 
     more   lines on edits that are lost in part
-    taker  ends "edits that ..."
+    taker  words of the message after "edits that"
     """
     layer, built = Path(stage.GetRootLayer().realPath), BuiltLayers(stage)
     if not built:
@@ -122,7 +124,7 @@ def require_no_lost_edit(
 def find_lost_edits(
     stage: Usd.Stage, built: BuiltLayers, left_out: LeftOut = _nothing
 ) -> list[LostEdit]:
-    """Return the edits that are lost, in the stage's order. Raises StageError for one over time."""
+    """Return the lost edits, in the stage's order. Raises StageError for an animated value."""
     finder = _Finder(stage, built, _bound_materials(stage, built), left_out)
     for prim, opinion in opinions_of_users(stage, built):
         finder.add(prim, opinion)
@@ -130,7 +132,7 @@ def find_lost_edits(
 
 
 def _sources_of_colors(stage: Usd.Stage) -> set[Sdf.Path]:
-    """Return the attributes outside of the channels to which a layer connects their colours."""
+    """Return the attributes outside of the channels that a channel's colour is connected to."""
     group = stage.GetPrimAtPath(specimen_of(stage).channels)
     inputs = [UsdShade.Material(prim).GetInput("color") for prim in group.GetChildren()]
     found = {
@@ -152,7 +154,10 @@ def _bound_materials(stage: Usd.Stage, built: BuiltLayers) -> set[Sdf.Path]:
 
 
 class _Finder:
-    """Collects what becomes of each opinion. One that inherits reach counts once."""
+    """Decides for each opinion whether it is lost.
+
+    An opinion on a class reaches several prims by inheritance. It counts once.
+    """
 
     def __init__(
         self, stage: Usd.Stage, built: BuiltLayers, bound: set[Sdf.Path], left_out: LeftOut
@@ -170,7 +175,7 @@ class _Finder:
         self._found.setdefault(opinion.source, []).append(edit)
 
     def lost(self) -> list[LostEdit]:
-        """Return the opinions that are lost at each prim which they reach."""
+        """Return the opinions that no prim takes over, one edit for each."""
         kept: dict[LostEdit, None] = {}
         for fates in self._found.values():
             edits = [fate for fate in fates if isinstance(fate, LostEdit)]
@@ -180,7 +185,7 @@ class _Finder:
         return list(kept)
 
     def _judge(self, prim: Usd.Prim, opinion: Opinion) -> LostEdit | _Fate:
-        """Return what becomes of an opinion at one of its prims."""
+        """Return an opinion as a lost edit of one of its prims, or why it is not reported."""
         path, name = opinion.prim, opinion.name
         if any(path.HasPrefix(one) for one in self._covered):
             return _Fate.COVERED
@@ -220,7 +225,7 @@ class _Finder:
         return _BUILT if is_built else ""
 
     def _judge_prim(self, path: Sdf.Path, prim: Usd.Prim, opinion: Opinion) -> LostEdit | _Fate:
-        """Return how a prim that no reader looks at is lost."""
+        """Return an opinion on a prim that no reader uses as a lost edit, or as covered."""
         own = prim.GetStage().GetPrimAtPath(path)
         if own and not own.IsDefined() and not own.IsAbstract():
             self._covered.add(path)
@@ -234,7 +239,7 @@ class _Finder:
             return LostEdit(str(path), "prim", "it stands in a variant that is not selected")
         kind = str(own.GetTypeName()) if own else ""
         if kind in _GROUPS and not (own and own.IsAbstract()):
-            return _Fate.COVERED  # by the lines on what it holds
+            return _Fate.COVERED  # by the lines on the prims below it
         self._covered.add(path)
         if not path.HasPrefix(self._specimen.root):
             reason = f"it lies outside {self._specimen.root}"
@@ -246,7 +251,7 @@ class _Finder:
         return LostEdit(f"{kind} {path}", kind, reason)
 
     def _fault(self, place: str, prim: Usd.Prim, opinion: Opinion) -> str:
-        """Return why an opinion at a place is lost; empty: it is taken over, or changes nothing."""
+        """Return why an opinion is lost; empty: it is taken over, or changes nothing."""
         name = opinion.name
         if name.startswith(_BINDING):
             if place in ("specimen", "tiles", "tile", "branch", *_OWN_BINDING):
@@ -285,7 +290,7 @@ class _Finder:
         return is_fed and is_taken(f"{place}, fed", name)
 
     def _weakness(self, prim: Usd.Prim, opinion: Opinion) -> str:
-        """Return what makes an opinion of a name that is read count for nothing; else empty."""
+        """Return why an opinion has no effect although its name is read; empty: it has one."""
         attribute, spec = prim.GetAttribute(opinion.name), opinion.spec
         if not attribute or not isinstance(spec, Sdf.AttributeSpec):
             return ""
@@ -308,7 +313,7 @@ class _Finder:
         return ""
 
     def _repeats(self, attribute: Usd.Attribute, spec: Sdf.Spec) -> bool:
-        """Return whether a value is the one that holds without it, or is of the type's own."""
+        """Return whether an opinion repeats the value of the build, or else the type's default."""
         if not attribute or not isinstance(spec, Sdf.AttributeSpec) or not spec.HasDefaultValue():
             return False
         below = [
@@ -321,7 +326,7 @@ class _Finder:
 
 
 def _place_of_group(prim: Usd.Prim) -> str:
-    """Return the place of a group that a layer adds below /Specimen; empty: it is none."""
+    """Return the place `group` for a group below /Specimen; empty for any other prim."""
     is_group = prim and prim.IsDefined() and not prim.IsAbstract() and prim.GetTypeName() in _GROUPS
     is_below = is_group and prim.GetPath().HasPrefix(specimen_of(prim.GetStage()).root)
     return "group" if is_below else ""
@@ -336,7 +341,7 @@ def _words_for(prim: Usd.Prim, path: Sdf.Path, name: str) -> str:
 
 
 def _fallback(attribute: Usd.Attribute) -> object:
-    """Return the value of an attribute that no layer states, by its prim's or its shader's type."""
+    """Return the default that the type of an attribute's prim or shader defines; None: none."""
     prim, name = attribute.GetPrim(), attribute.GetName()
     if prim.IsA(UsdShade.Shader) and name.startswith("inputs:"):
         node = Sdr.Registry().GetShaderNodeByIdentifier(str(UsdShade.Shader(prim).GetShaderId()))

@@ -1,7 +1,7 @@
-"""The numbers of a channel's 2D transfer functions as attributes: `gradient_max` is `gradientMax`.
+"""Write and read the numbers of a channel's 2D transfer functions as attributes of the stage.
 
-Writer and reader go by the fields of TransferFunctions2d, and by the limits that
-schemas/channel.schema.json has for their attributes.
+The names come from the fields of TransferFunctions2d: `gradient_max` becomes `gradientMax`. The
+limits come from schemas/channel.schema.json.
 """
 
 import json
@@ -22,7 +22,7 @@ from stereocell.usd.typed_values import read_as
 
 
 def attribute_of(field: str) -> str:
-    """Return the name of a field's attribute: stereocell:gradientMax for `gradient_max`."""
+    """Return the attribute's name for a field: `stereocell:gradientMax` for `gradient_max`."""
     first, *others = field.split("_")
     return f"stereocell:{first}{''.join(word.capitalize() for word in others)}"
 
@@ -41,8 +41,10 @@ def write_numbers(prim: Usd.Prim, transfer_2d: TransferFunctions2d) -> None:
 
 
 def read_numbers(prim: Usd.Prim) -> dict[str, float]:
-    """Return the numbers by field. One without a value is left out: only stages of other programs
-    lack any. Raises StageError for one outside its limits.
+    """Return the numbers by field name, without those that the stage lacks.
+
+    Stages that this pipeline wrote have all of them. Raises StageError for a number outside its
+    limits.
     """
     found = {}
     for field, attribute in ATTRIBUTES.items():
@@ -57,7 +59,7 @@ def read_numbers(prim: Usd.Prim) -> dict[str, float]:
 
 
 def _outside(value: float, limits: Mapping[str, Any]) -> str:
-    """Return the limits that a number breaks; empty: it is within them. NaN breaks all."""
+    """Return the limit that a number violates, in words; empty: none. NaN is never valid."""
     above, least = limits.get("exclusiveMinimum", -inf), limits.get("minimum", -inf)
     if not value > above:
         return f"above {above:g}"
@@ -69,6 +71,6 @@ def _outside(value: float, limits: Mapping[str, Any]) -> str:
 
 @cache
 def _limits() -> dict[str, dict[str, Any]]:
-    """Return the schemas of a channel's attributes."""
+    """Return the JSON schema of each attribute of a channel, by attribute name."""
     content = json.loads(find_asset("schemas/channel.schema.json").read_bytes())
     return dict(content["properties"])

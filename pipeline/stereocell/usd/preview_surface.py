@@ -1,4 +1,4 @@
-"""The UsdPreviewSurface of all materials that a build writes, and the colour that meshes repeat."""
+"""Write the UsdPreviewSurface of a material, and repeat its colour on the mesh."""
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
@@ -11,9 +11,9 @@ _Types = Sdf.ValueTypeNames
 
 
 def define_surface(material: UsdShade.Material, color: Color | None) -> UsdShade.Shader:
-    """Define a material's shader `surface`, and connect the material to it.
+    """Define a material's shader `surface`, and connect it to the material's output.
 
-    color  linear RGB; None: the mesh feeds it
+    color  linear RGB; None: the shader gets no colour here, since the mesh's primvars feed it
     """
     path = material.GetPath().AppendChild("surface")
     surface = UsdShade.Shader.Define(material.GetPrim().GetStage(), path)
@@ -28,9 +28,9 @@ def define_surface(material: UsdShade.Material, color: Color | None) -> UsdShade
 
 
 def repeat_color(mesh: UsdGeom.Mesh, color: Color) -> None:
-    """State a colour as the mesh's display colour, for programs that draw without materials.
+    """Write a colour as the mesh's display colour, for programs that draw without materials.
 
-    Custom data have it too, so that an edited display colour is known from the built one.
+    The attribute's custom data hold the same colour. If the two differ, the colour was edited.
     """
     attribute = mesh.CreateDisplayColorAttr([Gf.Vec3f(*color)])
     attribute.SetCustomDataByKey(BUILT_COLOR, Gf.Vec3f(*color))

@@ -1,8 +1,8 @@
 """Names of primvars on the meshes of a stage."""
 
-OBJECT_ID = "objectId"  # primvar: the place of a face's object in LABELS
-PAINT = "paint"  # primvar: intensity of the sampled channel at each vertex, 0..1
-# names of primvars that mean something else on a mesh, to us or to DCC tools
+OBJECT_ID = "objectId"  # primvar: index of a face's object in LABELS of write_objects.py
+PAINT = "paint"  # primvar, 0..1: intensity of the sampled channel at each vertex
+# Names that a table's column can't have: they have another meaning for us or for DCC tools
 RESERVED = frozenset(
     (
         OBJECT_ID,

@@ -1,7 +1,8 @@
 """Read the meshes and curves that a layer adds to a specimen: arrows, labels, implants, electrodes.
 
-They may stand anywhere below /Specimen. Each is read in world um, at the default time, with the
-plain values of its material. Without a material it has its display colour. Curves become tubes.
+Additions may stand anywhere below /Specimen. They are read in world um, at the default time. Only
+plain values of a material are used, no images. Without a material, an addition has its display
+colour. Curves become tubes.
 """
 
 from collections.abc import Iterator
@@ -24,18 +25,18 @@ from stereocell.usd.read_textures import maps_of
 from stereocell.usd.specimen import specimen_of
 from stereocell.usd.typed_values import read_as
 
-_GREY = (0.5, 0.5, 0.5)  # linear RGB of what has neither a material nor a display colour
-_POLYGONAL = ("none", "bilinear")  # schemes of subdivision whose edges stay sharp
+_GREY = (0.5, 0.5, 0.5)  # linear RGB of additions without a material and a display colour
+_POLYGONAL = ("none", "bilinear")  # subdivision schemes that keep edges sharp
 _Types = Sdf.ValueTypeNames
 
 
 @dataclass(frozen=True, slots=True)
 class Addition:
-    """A mesh that a layer adds.
+    """A mesh or curves that a layer adds.
 
-    path  of its prim, which tells it from all others
-    name  for people
-    mesh  in world um
+    path  path of the prim; it is unique
+    name  display name, or else the name of the prim
+    mesh  the surface, in world um
     """
 
     path: str
@@ -45,7 +46,7 @@ class Addition:
 
 
 def is_addition(prim: Usd.Prim) -> bool:
-    """Return whether a prim is a mesh or curves below /Specimen, and no surface of a channel."""
+    """Return whether a prim is a mesh or curves below /Specimen, but not a channel's surface."""
     path, specimen = prim.GetPath(), specimen_of(prim.GetStage())
     is_drawn = prim.IsA(UsdGeom.Mesh) or prim.IsA(UsdGeom.BasisCurves)
     return (
@@ -54,7 +55,7 @@ def is_addition(prim: Usd.Prim) -> bool:
 
 
 def read_additions(stage: Usd.Stage) -> Iterator[Addition]:
-    """Yield what layers add, in the stage's order.
+    """Yield the visible additions that have faces, in the stage's order.
 
     Raises StageError for values that can't be drawn.
     """
@@ -66,7 +67,7 @@ def read_additions(stage: Usd.Stage) -> Iterator[Addition]:
 
 
 def notes_on_additions(stage: Usd.Stage) -> Iterator[str]:
-    """Yield a line on each image and each subdivision that is lost, and on what has no faces."""
+    """Yield a message for each image and subdivision that is lost, and for each empty addition."""
     for prim in _additions(stage):
         if not _has_faces(prim):
             yield f"{prim.GetTypeName()} {prim.GetPath()} is not taken over: it has no faces"
@@ -82,9 +83,9 @@ def notes_on_additions(stage: Usd.Stage) -> Iterator[str]:
 
 
 def _is_subdivided_by_default(prim: Usd.Prim) -> bool:
-    """Return whether other programs round a mesh that states no scheme of subdivision.
+    """Return whether other programs subdivide a mesh because it states no subdivision scheme.
 
-    A mesh with normals is polygonal in the eyes of most of them.
+    Subdivision is USD's default. Most programs treat a mesh that has normals as polygonal, though.
     """
     if not prim.IsA(UsdGeom.Mesh):
         return False
@@ -100,7 +101,7 @@ def _additions(stage: Usd.Stage) -> Iterator[Usd.Prim]:
 
 
 def _is_surface(path: Sdf.Path, tiles: Sdf.Path) -> bool:
-    """Return whether a channel's surface in a tile has this path."""
+    """Return whether a path is that of a channel's surface in a tile."""
     names = str(path.MakeRelativePath(tiles)).split("/") if path.HasPrefix(tiles) else []
     return len(names) == 3 and names[2] == f"{names[1]}_{names[0]}"
 
@@ -126,7 +127,7 @@ def _read(prim: Usd.Prim) -> Mesh | None:
 
 
 def _is_faceted(prim: Usd.Prim) -> bool:
-    """Return whether USD shades each face by itself: a polygonal mesh that states no normals."""
+    """Return whether USD shades a mesh flat: it is polygonal and has no normals."""
     mesh = UsdGeom.Mesh(prim)
     is_polygonal = mesh.GetSubdivisionSchemeAttr().Get() in _POLYGONAL
     has_normals = (
@@ -136,7 +137,7 @@ def _is_faceted(prim: Usd.Prim) -> bool:
 
 
 def _facet(mesh: Mesh) -> Mesh:
-    """Return a mesh whose triangles have corners and a normal of their own."""
+    """Return a flat-shaded copy of a mesh: no two triangles share vertices."""
     corners = mesh.triangles.ravel()
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     normals = np.cross(b - a, c - a)

@@ -1,4 +1,4 @@
-"""Read the appearances of a composed stage: the channels', and that of a tile's own mesh."""
+"""Read the appearances of a composed stage: those of the channels, and the material of a mesh."""
 
 import itertools
 from typing import get_args
@@ -31,12 +31,15 @@ from stereocell.usd.specimen import specimen_of
 from stereocell.usd.typed_values import read_as, text_of
 
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-_MAX_POINTS = 10_000  # pairs of a transfer function, which is drawn with 256 values
+_MAX_POINTS = 10_000  # largest number of opacity points; the function is drawn with 256 values
 _VOLUME_WINDOW = "stereocell:volumeWindow"
 
 
 def read_appearances(stage: Usd.Stage) -> list[ComposedAppearance]:
-    """Return the channels' appearances, in the stage's order: one or more. Raises StageError."""
+    """Return the appearances of all active channels, in the stage's order.
+
+    Raises StageError if there is none, or for invalid values.
+    """
     group = specimen_of(stage).channels
     prims = stage.GetPrimAtPath(group).GetChildren()
     found = [_read_appearance(prim) for prim in prims if prim.IsA(UsdShade.Material)]
@@ -47,7 +50,7 @@ def read_appearances(stage: Usd.Stage) -> list[ComposedAppearance]:
 
 
 def surface_of(prim: Usd.Prim) -> UsdShade.Shader:
-    """Return the UsdPreviewSurface that a mesh is drawn with. Raises StageError."""
+    """Return the UsdPreviewSurface of a mesh's material. Raises StageError if it has none."""
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
     if not material:
         raise StageError(f"{prim.GetPath()}: no material bound")
@@ -58,8 +61,10 @@ def surface_of(prim: Usd.Prim) -> UsdShade.Shader:
 
 
 def material_of(surface: UsdShade.Shader) -> Material:
-    """Return what glTF takes over of a UsdPreviewSurface; white where an image or the mesh's own
-    colours feed it. Raises StageError.
+    """Return the glTF material for a UsdPreviewSurface.
+
+    It is white if an image or the mesh's own colours feed the colour. Raises StageError for invalid
+    values.
     """
     color = WHITE
     if feeder(surface, "color") is None:
@@ -67,7 +72,7 @@ def material_of(surface: UsdShade.Shader) -> Material:
         if diffuse is None:
             raise StageError(f"{surface.GetPath()}.inputs:diffuseColor: no value")
         color = color_of(diffuse)
-    # defaults: the specification of UsdPreviewSurface
+    # The defaults below are those of the specification of UsdPreviewSurface.
     emissive = _source(surface, "emissiveColor")
     return Material(
         color,
@@ -79,14 +84,14 @@ def material_of(surface: UsdShade.Shader) -> Material:
 
 
 def _opacity(surface: UsdShade.Shader) -> float:
-    """Return a surface's opacity: 0 or 1 where a threshold is stated."""
+    """Return a surface's opacity, 0..1. With an opacity threshold, it is either 0 or 1."""
     opacity = _share(surface, "opacity", 1.0)
     threshold = _share(surface, "opacityThreshold", 0.0)
     return opacity if threshold == 0 else float(opacity >= threshold)
 
 
 def edited_color(material: Usd.Prim) -> Usd.Attribute | None:
-    """Return the colour of a material's interface if it was edited since the build."""
+    """Return the attribute `inputs:color` of a material if it was edited since the build."""
     interface = _interface_color(material)
     surface = material.GetChild("surface")
     repeated = surface.GetAttribute("inputs:diffuseColor") if surface else None
@@ -97,16 +102,17 @@ def edited_color(material: Usd.Prim) -> Usd.Attribute | None:
 def _interface_color(material: Usd.Prim) -> Usd.Attribute | None:
     """Return the attribute that gives a material's `inputs:color` its value, through connections.
 
-    A layer may connect it to another channel's colour. Raises StageError for a shader's output.
+    A layer may connect it to another channel's colour. Raises StageError if a shader feeds it.
     """
     return _source(UsdShade.Material(material), "color")
 
 
 def _color_source(surface: UsdShade.Shader) -> Usd.Attribute | None:
-    """Return the attribute with a surface's colour: the interface's, if it was edited.
+    """Return the attribute that has a surface's colour.
 
-    The shader repeats the colour, for programs that don't follow connections. An edit of the
-    shader's value counts only if the interface was not edited.
+    The colour is stored twice: as input of the material, and again in the shader, for programs that
+    do not follow connections. An edit of the shader's value counts only if the material's input
+    was not edited.
     """
     source = _source(surface, "diffuseColor")
     is_own = source is not None and source.GetPrim() == surface.GetPrim()
@@ -115,10 +121,7 @@ def _color_source(surface: UsdShade.Shader) -> Usd.Attribute | None:
 
 
 def _channel_color(prim: Usd.Prim) -> Usd.Attribute:
-    """Return the attribute with a channel's colour.
-
-    It is the interface's where the shader has no colour of its own.
-    """
+    """Return the attribute that has a channel's colour: the material's if the shader has none."""
     surface = UsdShade.Shader(prim.GetChild("surface"))
     diffuse = surface.GetInput("diffuseColor") if surface else None
     has_value = diffuse and not diffuse.HasConnectedSource() and diffuse.Get() is not None
@@ -131,7 +134,7 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
     chosen = variants.GetVariantSelection() or DEFAULT_FUNCTION
     names = sorted(variants.GetVariantNames(), key=lambda name: (name != DEFAULT_FUNCTION, name))
     functions, shapes = {}, {}
-    for name in names or [chosen]:  # a flattened stage has what was chosen, and no variants
+    for name in names or [chosen]:  # a flattened stage has only the selected function, no variants
         if names:
             select_variant(prim, "transferFunction", name)
         functions[name] = _opacity_points(prim)
@@ -145,7 +148,7 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         prim.GetDisplayName() or prim.GetName(),
         color_of(_channel_color(prim)),
         window,
-        # only stages of other programs lack it
+        # Only stages of other programs lack a volume window.
         _window(prim, _VOLUME_WINDOW) if prim.GetAttribute(_VOLUME_WINDOW).HasValue() else window,
         _number(prim, "stereocell:isoValue"),
         _surface_confidence(prim, "stereocell:surfaceVerdict"),
@@ -160,9 +163,9 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
 
 
 def shows_at_first(prim: Usd.Prim) -> bool:
-    """Return whether a channel, given by its material, shows when the specimen is opened.
+    """Return whether a channel, given by its material, is visible when the specimen is opened.
 
-    It does in stages that do not say. Raises StageError for a visibility over time.
+    It is if the stage does not state it. Raises StageError for an animated visibility.
     """
     stage = prim.GetStage()
     path = specimen_of(stage).shown.AppendChild(prim.GetName())
@@ -204,7 +207,7 @@ def _number(prim: Usd.Prim, name: str) -> float | None:
 
 def _surface_confidence(prim: Usd.Prim, name: str) -> SurfaceConfidence:
     value = read_as(prim.GetAttribute(name), Sdf.ValueTypeNames.Token)
-    if value is None:  # only stages of other programs lack it
+    if value is None:  # only stages of other programs have no such attribute
         return "clear"
     for confidence in get_args(SurfaceConfidence):
         if value == confidence:

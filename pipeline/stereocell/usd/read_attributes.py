@@ -1,4 +1,4 @@
-"""Read single values of a composed stage. Errors name the prim."""
+"""Read single values of a composed stage. The errors name the prim and the attribute."""
 
 from math import isfinite
 from pathlib import Path
@@ -16,7 +16,7 @@ Point = tuple[float, float, float]
 def value_of(prim: Usd.Prim, name: str, expected: Sdf.ValueTypeName) -> Any:  # USD's type of it
     """Return an attribute's value at the default time.
 
-    Raises StageError where it has none, or one of another type than `expected`.
+    Raises StageError if it has no value, or one of another type than `expected`.
     """
     value = read_as(prim.GetAttribute(name), expected)
     if value is None:
@@ -25,14 +25,14 @@ def value_of(prim: Usd.Prim, name: str, expected: Sdf.ValueTypeName) -> Any:  # 
 
 
 def require_still(*attributes: Usd.Attribute) -> None:
-    """Raise StageError for values over time, as of an animation: those are not looked at."""
+    """Raise StageError for an animated attribute: readers use the default time only."""
     for attribute in attributes:
         if attribute and attribute.GetNumTimeSamples():
             raise StageError(over_time(attribute))
 
 
 def over_time(attribute: Usd.Attribute) -> str:
-    """Return the message for an attribute that has values over time."""
+    """Return the error message for an animated attribute."""
     return (
         f"{attribute.GetPath()}: found values over time, expected one without a time: "
         "nothing moves here, export one frame"
@@ -49,9 +49,9 @@ def file_of(attribute: Usd.Attribute) -> Path:
 
 
 def color_of(attribute: Usd.Attribute, value: Any = None) -> tuple[float, float, float]:
-    """Return a colour, linear RGB. Raises StageError where a part is absent or outside 0..1.
+    """Return a colour, linear RGB. Raises StageError if it is missing or a part is outside 0..1.
 
-    value  one of those that the attribute holds; None: it holds the colour alone
+    value  one colour of an attribute that holds an array; None: the attribute holds one colour
     """
     if value is None:
         value = read_as(attribute, Sdf.ValueTypeNames.Color3f, may_be_nan=True)
@@ -80,7 +80,7 @@ def numbers_of(prim: Usd.Prim, name: str, count: int) -> list[float]:
 
 
 def sizes_of(prim: Usd.Prim, name: str, count: int) -> list[int]:
-    """Return an attribute's whole numbers. Raises StageError unless there are `count`, all >= 0."""
+    """Return an attribute's whole numbers. Raises StageError unless there are `count`, none < 0."""
     numbers = numbers_of(prim, name, count)
     if not all(number >= 0 and number.is_integer() for number in numbers):
         raise StageError(f"{prim.GetPath()}.{name}: found {numbers}, expected sizes in voxels")
@@ -94,12 +94,12 @@ def point_of(prim: Usd.Prim, name: str) -> Point:
 
 
 def shortest(number: float) -> float:
-    """Return the shortest decimal of a float32: 0.2, not 0.20000000298023224."""
+    """Return the shortest decimal that is the same float32: 0.2, not 0.20000000298023224."""
     return float(str(np.float32(number)))
 
 
 def select_variant(prim: Usd.Prim, variant_set: str, variant: str) -> None:
-    """Select a variant for this process alone: in the session layer, which is never saved."""
+    """Select a variant in the session layer, which is never saved."""
     stage = prim.GetStage()
     with Usd.EditContext(stage, stage.GetSessionLayer()):
         prim.GetVariantSet(variant_set).SetVariantSelection(variant)

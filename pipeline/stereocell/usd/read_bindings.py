@@ -1,8 +1,8 @@
-"""Which materials that a layer binds above the channels reach the surfaces of a bundle.
+"""Find materials that a layer binds to the specimen, the tiles' group or a tile.
 
-The stage binds a material on each mesh. One that is bound on the specimen, the group of tiles or a
-tile reaches the meshes if it is bound as stronger than its descendants. Volumes have transfer
-functions in the place of materials, so they keep the channels' colours.
+The stage binds a material to each mesh. A material that is bound higher up reaches the meshes only
+if its binding is stronger than those of descendants. It does not change volumes: they are drawn by
+transfer functions and keep the channels' colours.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ _EDIT = f"inputs:color of {CHANNELS}/NAME changes surfaces and volumes"
 
 
 def notes_on_bindings(stage: Usd.Stage) -> Iterator[str]:
-    """Yield a sentence on each material above the channels that the surfaces take over."""
+    """Yield a message for each material, bound above the channels, that surfaces are drawn with."""
     specimen = specimen_of(stage)
     groups = (stage.GetPrimAtPath(path) for path in (specimen.root, specimen.tiles))
     for prim in (*groups, *tile_prims(stage)):
@@ -35,10 +35,9 @@ def notes_on_bindings(stage: Usd.Stage) -> Iterator[str]:
 
 
 def binding_fault(prim: Usd.Prim, relationship: Usd.Relationship, *, is_own: bool = False) -> str:
-    """Return why a material that is bound on a prim reaches no surface; empty: it reaches those
-    below.
+    """Return why a bound material has no effect on surfaces; empty: it has one, or was unbound.
 
-    is_own  whether the prim is a surface's mesh, which has no stronger binding
+    is_own  whether the binding needs no strength, as on a mesh, since no stronger one lies below
     """
     if not relationship.GetTargets():
         return ""
@@ -58,8 +57,8 @@ def _materials(relationship: Usd.Relationship) -> list[Sdf.Path]:
 
 
 def _purpose(relationship: Usd.Relationship) -> str:
-    """Return the purpose that a binding is restricted to; empty: it is for all."""
+    """Return the purpose that a binding is restricted to; empty: all purposes."""
     parts = relationship.GetName().split(":")[2:]
-    if parts[:1] == [_COLLECTION]:  # then comes the binding's own name, behind a purpose if any
+    if parts[:1] == [_COLLECTION]:  # "collection", an optional purpose, the binding's name
         parts = parts[1:-1]
     return parts[0] if parts else ""

@@ -1,10 +1,10 @@
-"""Read basis curves of a composed stage as lines of points, with the width at each.
+"""Read basis curves of a composed stage as polylines with a width at each point.
 
-A cubic span is evaluated at SAMPLES_PER_SPAN points.
+Each span of a cubic curve is evaluated at SAMPLES_PER_SPAN points.
 
 References
 ----------
-OpenUSD, UsdGeomBasisCurves: basis matrices, and how vertices make spans.
+OpenUSD, UsdGeomBasisCurves: basis matrices, and the vertices of each span.
 """
 
 from collections.abc import Iterator
@@ -17,8 +17,8 @@ from stereocell.model.errors import StageError
 from stereocell.usd.typed_values import read_as
 
 SAMPLES_PER_SPAN = 12
-_WIDTH_SHARE = 0.01  # width of curves that state none, as a share of their longest edge
-# rows: powers of the parameter, the highest first; columns: the four vertices of a span
+_WIDTH_SHARE = 0.01  # default width of curves, as a share of the longest edge of their box
+# Basis matrices. Rows: powers of the parameter, highest first; columns: four vertices of a span
 _BASES = {
     "bezier": [[-1, 3, -3, 1], [3, -6, 3, 0], [-3, 3, 0, 0], [1, 0, 0, 0]],
     "bspline": [[-1 / 6, 1 / 2, -1 / 2, 1 / 6], [1 / 2, -1, 1 / 2, 0], [-1 / 2, 0, 1 / 2, 0],
@@ -33,7 +33,7 @@ Line = tuple[NDArray[np.float64], NDArray[np.float64]]  # points (n, 3), widths 
 def curve_lines(curves: UsdGeom.BasisCurves) -> Iterator[Line]:
     """Yield the points and widths of each curve, in the prim's own space.
 
-    Raises StageError where numbers of vertices or widths do not fit, or for an unknown basis.
+    Raises StageError if the number of vertices or widths is wrong, or for an unknown basis.
     """
     path = curves.GetPath()
     points = np.array(read_as(curves.GetPointsAttr(), _Types.Point3fArray) or [], np.float64)
@@ -61,7 +61,7 @@ def curve_lines(curves: UsdGeom.BasisCurves) -> Iterator[Line]:
 
 
 def _widths(curves: UsdGeom.BasisCurves, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the width at each vertex; one that is not given for each holds for all."""
+    """Return the width at each vertex. A single stated width, or the default, holds for all."""
     given = np.array(read_as(curves.GetWidthsAttr(), _Types.FloatArray) or [], np.float64)
     if len(given) == len(points):
         return given
@@ -74,7 +74,7 @@ def _widths(curves: UsdGeom.BasisCurves, points: NDArray[np.float64]) -> NDArray
 
 
 def _evaluate(values: NDArray[np.float64], basis: str, path: str) -> NDArray[np.float64]:
-    """Return points along the spans of a cubic curve, ends included."""
+    """Return points along the spans of a cubic curve, including both ends."""
     step = 3 if basis == "bezier" else 1
     if len(values) < 4 or (len(values) - 4) % step:
         raise StageError(f"{path}: found {len(values)} vertices, which make no {basis} curve")

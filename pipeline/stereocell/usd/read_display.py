@@ -1,7 +1,8 @@
-"""Read the display colour and opacity of a mesh: primvars of its own, or of a prim above it.
+"""Read the display colour and opacity of a mesh: its own primvars, or those of an ancestor.
 
-Artists set them on any prim, without a material. A bundle takes a display colour where nothing else
-than a plain value feeds the colour of the mesh's material, and multiplies the opacities.
+Artists set these primvars on any prim, without a material. A bundle uses the display colour unless
+an image or a primvar feeds the material's colour. It multiplies the display opacity by that of the
+material.
 """
 
 from pxr import Sdf, Usd, UsdGeom, UsdShade
@@ -17,14 +18,14 @@ Color = tuple[float, float, float]
 
 
 def shows_display_color(surface: UsdShade.Shader) -> bool:
-    """Return whether a material leaves the colour of its meshes to their display colours."""
+    """Return whether display colours apply: no shader feeds the colour of the material."""
     return feeder(surface, "color") is None
 
 
 def display_color(mesh: Usd.Prim) -> Color | None:
-    """Return the one display colour of a mesh, linear RGB; None: it has none, or several.
+    """Return the edited display colour of a mesh, linear RGB; None: not edited, or many colours.
 
-    Raises StageError for one outside 0..1.
+    Raises StageError for a colour outside 0..1.
     """
     primvar = _find_edited_color(mesh)
     if primvar is None or not is_single(primvar):
@@ -33,12 +34,12 @@ def display_color(mesh: Usd.Prim) -> Color | None:
 
 
 def _find_edited_color(mesh: Usd.Prim) -> UsdGeom.Primvar | None:
-    """Return the display colour that holds for a mesh if the build did not state it."""
+    """Return a mesh's own or inherited display colour, unless the build wrote it."""
     prim = mesh
     while prim and not prim.IsPseudoRoot():
         primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("displayColor")
         is_stated = bool(primvar) and primvar.HasAuthoredValue()
-        # USD inherits constant primvars alone
+        # Meshes inherit only constant primvars.
         is_heard = prim == mesh or (
             is_stated and primvar.GetInterpolation() == UsdGeom.Tokens.constant
         )
@@ -49,13 +50,13 @@ def _find_edited_color(mesh: Usd.Prim) -> UsdGeom.Primvar | None:
 
 
 def has_many_display_colors(mesh: Usd.Prim) -> bool:
-    """Return whether a mesh has display colours of its own at its points or faces."""
+    """Return whether a mesh has its own display colours for its points, faces or corners."""
     primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("displayColor")
     return bool(primvar) and bool(primvar.HasValue()) and not is_single(primvar)
 
 
 def display_opacity(mesh: Usd.Prim, channel: Usd.Prim | None) -> float:
-    """Return the display opacity of a mesh times that of its channel, 0..1; 1: none is stated.
+    """Return the display opacity of a mesh times that of its channel, 0..1. The default is 1.
 
     Raises StageError for values of another type.
     """

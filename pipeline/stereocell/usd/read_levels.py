@@ -1,6 +1,6 @@
-"""Read the surfaces of a loaded tile, level by level of detail, edited or not.
+"""Read the surfaces of a loaded tile at each level of detail, including an artist's edits.
 
-The levels are variants; the reader selects one after the other in the session layer.
+The levels are variants. The reader selects them one after the other in the session layer.
 """
 
 from collections.abc import Iterator
@@ -44,7 +44,10 @@ _Types = Sdf.ValueTypeNames
 
 @dataclass(frozen=True, slots=True)
 class MadeMaps:
-    """Maps of a recomputed level, uint8: normals (h, w, 3), openness (h, w), sRGB (h, w, 3)."""
+    """Baked maps of a level that was computed again after an edit.
+
+    All are uint8: normals (h, w, 3), openness (h, w), sRGB colours (h, w, 3). None: no map.
+    """
 
     normal: NDArray[np.uint8] | None
     occlusion: NDArray[np.uint8] | None
@@ -53,16 +56,18 @@ class MadeMaps:
 
 @dataclass(frozen=True, slots=True)
 class ComposedLod:
-    """One level of detail, in world um. `level` counts from the finest, 0.
+    """A channel's surface in one tile at one level of detail, in world um.
 
-    matrix  (4, 4) for row vectors, from the mesh's own space to world um
-    distance_um  99th percentile of the distances from the iso-surface, and back
-    largest_um   the largest of them; the former, where a stage of an earlier version has none
-    shape   hash of the composed points and faces
-    built   the same hash as the pipeline wrote it; empty: the stage has none
-    own     the mesh prim's own transform
-    lost    values that an edit invalidated: they belong to other vertices
-    images  maps in memory, where the level was recomputed: see bundle/edited_meshes.py
+    level        0 is the finest level
+    distance_um  99th percentile of the distances between mesh and iso-surface, both ways, um
+    largest_um   largest of these distances, um; equal to `distance_um` in stages of earlier
+                 versions, which do not state it
+    matrix       (4, 4) for row vectors, from the mesh's own space to world um
+    shape        hash of the composed points and faces; empty if `built` is
+    built        the same hash as the build wrote it; empty: the stage has none
+    own          the 16 numbers of the transform on the mesh's prim
+    lost         values that an edit of the faces made invalid: `maps`, `occlusion`, `colours`
+    images       maps in memory, if the level was computed again: see bundle/edited_meshes.py
     """
 
     level: int
@@ -80,9 +85,10 @@ class ComposedLod:
 
 
 def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
-    """Yield a loaded tile's levels of detail of one channel; none: no surface.
+    """Yield the levels of detail of a channel's surface in a loaded tile, finest first.
 
-    Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
+    Yields nothing if the tile has no surface. Raises StageError for a mesh that can't be drawn, for
+    example without a material.
     """
     levels = lod_levels(tile)
     for level in levels or [0]:  # a flattened stage has one level, and no variants
@@ -127,7 +133,7 @@ def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
 def _material(
     prim: Usd.Prim, surface: UsdShade.Shader, channel_id: str
 ) -> tuple[Material, set[str]]:
-    """Return how a mesh is drawn, and the primvars that its vertices' values come from."""
+    """Return a mesh's material, and the names of the primvars that feed it."""
     material, fed = material_of(surface), vertex_values_of(surface)
     if shows_display_color(surface):
         if (color := display_color(prim)) is not None:
@@ -140,7 +146,7 @@ def _material(
 
 
 def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> ComposedLod:
-    """Return an edited level without maps and vertex values that belong to other faces."""
+    """Return an edited level without the maps and primvars that no longer fit its faces."""
     mesh, lost, has_color = lod.mesh, [], True
     if lod.maps.any and mesh.uvs is None:
         has_color = lod.maps.color is None
@@ -153,14 +159,14 @@ def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> Compose
         has_color = False
     given = read_as(UsdGeom.Gprim(prim).GetDisplayColorAttr(), _Types.Color3fArray)
     colors = np.array(given or [], np.float64)
-    if not has_color and colors.size:  # one average colour replaces them
+    if not has_color and colors.size:  # the average of the mesh's colours replaces lost ones
         r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
         lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
     return replace(lod, lost=tuple(lost))
 
 
 def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
-    """Return an edited level's mesh in its own space. Raises StageError where it is gone."""
+    """Return an edited level's mesh in its own space. Raises StageError if there is none."""
     prim = mesh_at(tile, channel_id, level)
     found = None
     if prim is not None:
@@ -172,7 +178,7 @@ def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
 
 
 def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
-    """Return the levels whose faces an edit removed, all of them."""
+    """Return the levels from which an edit removed all faces."""
     found = []
     for level in lod_levels(tile) or [0]:
         prim = mesh_at(tile, channel_id, level)
@@ -184,13 +190,13 @@ def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
 
 
 def count_faces(mesh: Usd.Prim) -> int:
-    """Return the number of faces of a mesh. Raises StageError where they aren't whole numbers."""
+    """Return the number of faces of a mesh. Raises StageError for values of another type."""
     counts = UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr()
     return len(read_as(counts, _Types.IntArray) or ())
 
 
 def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
-    """Select a level and return the mesh that it draws; None: it draws none."""
+    """Select a level of a tile and return its mesh; None: no mesh is drawn."""
     if lod_levels(tile):
         select_variant(tile, "lod", f"lod{level}")
     prim = drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}"))
@@ -198,7 +204,10 @@ def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
 
 
 def _edit_advice(level: int) -> str:
-    """Explain that an edit outside the variants overrides all levels, and fits one at most."""
+    """Return advice for an edit that contradicts a level's mesh.
+
+    An edit outside the `lod` variants overrides all levels, but fits one of them at most.
+    """
     return (
         f" at lod{level}: edit inside the variant lod=lod{level}, or override points, "
         "faceVertexCounts, faceVertexIndices and normals together"

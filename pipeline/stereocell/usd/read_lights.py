@@ -1,12 +1,12 @@
-"""Read the lights of a stage that a user's layers edit or add: the viewer's lamps and its room.
+"""Read the lights that a user's layers edit or add: lamps, and the light of the surroundings.
 
-A distant light and a sphere become lamps, and all domes together become the room's light. The
-lights of the build are not read by themselves: without an edit the viewer has its own lamps, which
-hang over the viewer's shoulder. Where an edit leaves no light at all, it has them as well.
+Distant lights and sphere lights become lamps of the viewer. All dome lights together become the
+light of the surroundings (`room`). If no layer edits the lights, or if no light is left, the viewer
+uses its own lamps, which hang over the user's shoulder. It does not use the lights of the build.
 
-Strengths are radiances, as UsdLux defines them: those that a white, matt surface in the specimen's
-middle sends on where it faces the lamp. A sphere's light grows weaker by the square of the distance
-from its middle, as that of a point.
+A lamp's strength is the radiance of a white, matt surface in the specimen's middle that faces the
+lamp, in the units of UsdLux. The light of a sphere falls off with the square of the distance from
+its middle, as that of a point light.
 
 References: OpenUSD, UsdLux, https://openusd.org/release/api/usd_lux_page_front.html
 """
@@ -28,15 +28,15 @@ from stereocell.usd.layer_opinions import defined_prims
 from stereocell.usd.read_attributes import Point, file_of, require_still, value_of
 from stereocell.usd.specimen import Specimen, specimen_of
 
-MAX_LAMPS = 3  # of the viewer
-MAX_STRENGTH = 10.0  # of a lamp of the viewer; a stronger one is as strong as this
-_NEAREST = 0.25  # longest edges: a lamp in the specimen is as bright as at this distance
+MAX_LAMPS = 3  # largest number of lamps in the viewer
+MAX_STRENGTH = 10.0  # largest strength of a lamp in the viewer; stronger lamps are dimmed to it
+_NEAREST = 0.25  # share of the specimen's longest edge: smallest distance of a lamp that counts
 _KINDS = (UsdLux.DistantLight, UsdLux.SphereLight, UsdLux.DomeLight, UsdLux.DomeLight_1)
-# The image of a dome may have these parameterizations, and its pole may be there.
+# Values that are supported for a dome's image: its projection, and the axis of its poles
 _KNOWN = {"inputs:texture:format": ("latlong", "automatic"), "poleAxis": ("Y", "scene")}
 _WHITE = (1.0, 1.0, 1.0)
 
-# These inputs decide how bright a lamp or a room is, and in which colour.
+# Inputs that decide the brightness and the colour of a light
 INPUTS = (
     "inputs:color",
     "inputs:intensity",
@@ -56,9 +56,9 @@ class StageLamp:
     """A lamp of the viewer.
 
     color     linear RGB; the largest part is 1
-    strength  see the module
-    towards   the unit vector (x, y, z) from the specimen to a distant lamp, world; else None
-    position  of a lamp with a place, um, world; else None
+    strength  radiance of a white surface that the lamp lights, see the module
+    towards   unit vector (x, y, z) to a distant lamp, world; None for a sphere
+    position  place of a sphere, um, world; None for a distant lamp
     """
 
     name: str
@@ -70,10 +70,11 @@ class StageLamp:
 
 @dataclass(frozen=True, slots=True)
 class StageLights:
-    """The light of a stage: the strongest lamps, strongest first, and the radiance of its domes.
+    """The light of a stage.
 
-    lost  names of the lamps that are too many
-    room  None: the stage has no dome
+    lamps  the strongest lamps, at most MAX_LAMPS, strongest first
+    lost   names of the weaker lamps, which are left out
+    room   radiance of all domes together; None: the stage has no dome
     """
 
     lamps: tuple[StageLamp, ...]
@@ -82,13 +83,13 @@ class StageLights:
 
 
 def is_light(prim: Usd.Prim) -> bool:
-    """Return whether a prim is a light that becomes a lamp or the room's light."""
+    """Return whether a prim is a light below /Specimen of a kind that the viewer has."""
     root = specimen_of(prim.GetStage()).root
     return prim.GetPath().HasPrefix(root) and any(prim.IsA(kind) for kind in _KINDS)
 
 
 def visible_lights(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    """Yield the prims of the lights below /Specimen that are drawn, in the stage's order."""
+    """Yield the prims of all visible lights below /Specimen, in the stage's order."""
     for prim in defined_prims(stage):
         if is_light(prim) and is_visible(prim):
             yield prim
@@ -100,10 +101,11 @@ def read_lights(
     high: NDArray[np.float64],
     require: Callable[[Path], Path],
 ) -> StageLights | None:
-    """Return the light of a stage; None: it has none, or that of the build.
+    """Return the light of a stage; None: there is none, or only the unchanged light of the build.
 
-    low, high  bound the specimen (x, y, z), um
-    require    returns a file that the stage names, or raises StageError where it is damaged
+    low, high  corners of the specimen's box (x, y, z), um, world
+    require    called with each file before it is read; returns it, or raises StageError if it is
+               damaged
 
     Raises StageError for values over time, and for an image that can't be read.
     """
@@ -128,7 +130,7 @@ def read_lights(
 
 
 def notes_on_lights(lights: StageLights | None) -> Iterator[str]:
-    """Yield a line on each lamp that is lost or weaker than in the stage."""
+    """Yield a message for each lamp that is left out or dimmed."""
     for name in lights.lost if lights else ():
         yield (
             f"light {name!r} is not taken over: the viewer has {MAX_LAMPS} lamps, and others are "
@@ -143,7 +145,7 @@ def notes_on_lights(lights: StageLights | None) -> Iterator[str]:
 
 
 def _descriptions(lights: list[Usd.Prim], root: Sdf.Path) -> dict[str, tuple[object, ...]]:
-    """Return what each light says, by its path below a specimen, to be compared with the build."""
+    """Return a comparable description of each light, by its path below the specimen."""
     paths = [str(light.GetPath().MakeRelativePath(root)) for light in lights]
     return {path: _description(light, root) for path, light in zip(paths, lights, strict=True)}
 
@@ -172,7 +174,7 @@ def _built_descriptions() -> dict[str, tuple[object, ...]]:
 
 
 def _radiance(light: Usd.Prim) -> NDArray[np.float64]:
-    """Return a light's radiance (r, g, b) before `normalize` and a dome's image."""
+    """Return a light's radiance (r, g, b), before `normalize` and a dome's image are applied."""
     intensity, exposure = (_number(light, name) for name in ("intensity", "exposure"))
     color = np.array(value_of(light, "inputs:color", Sdf.ValueTypeNames.Color3f), np.float64)
     api = UsdLux.LightAPI(light)
@@ -199,7 +201,7 @@ def _lamp_of(
     towards = position = None
     if light.IsA(UsdLux.DistantLight):
         angle = _number(light, "angle")
-        # A parallel light has no size to multiply by.
+        # `size` is the projected solid angle. It is 0 for parallel light, which is not scaled.
         size = pi * sin(radians(min(max(angle, 0.0), 180.0)) / 2) ** 2
         irradiance = radiance if is_normalized or size == 0 else radiance * size
         towards = _unit(matrix[2, :3])
@@ -219,7 +221,7 @@ def _lamp_of(
 def _room_of(
     light: Usd.Prim, radiance: NDArray[np.float64], require: Callable[[Path], Path]
 ) -> Radiance:
-    """Return the radiance around the specimen by a dome (rows from the top, columns, 3)."""
+    """Return the radiance of a dome as an image (rows from the top, columns, 3), in the world."""
     attribute = light.GetAttribute("inputs:texture:file")
     asset = attribute.Get()
     if asset is None or not asset.path:
@@ -236,7 +238,7 @@ def _room_of(
 
 
 def _sum_of(one: Radiance, other: Radiance) -> Radiance:
-    """Return the light of two rooms together, with the directions of the finer one."""
+    """Return the sum of two images of radiance, at the resolution of the finer one."""
     fine, coarse = (one, other) if one.shape[0] >= other.shape[0] else (other, one)
     rows, columns = (
         (np.arange(fine.shape[axis]) * coarse.shape[axis]) // fine.shape[axis] for axis in (0, 1)

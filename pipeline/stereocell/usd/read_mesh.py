@@ -1,8 +1,8 @@
-"""Read a mesh of a composed stage as USD draws it: triangles in the world, one value per vertex.
+"""Read a mesh of a composed stage as triangles in the world, with one value per vertex.
 
-The pipeline's own meshes are triangles with vertex normals and pass through unchanged. Edits by a
-DCC tool are converted: polygons, values per face corner, left-handed orientation, moved and
-mirrored tiles.
+The pipeline's own meshes are triangles with vertex normals and stay unchanged. The reader converts
+the output of DCC tools: polygons, values per face corner, left-handed faces, and tiles that were
+moved or mirrored.
 """
 
 from collections.abc import Collection, Mapping
@@ -19,9 +19,9 @@ from stereocell.usd.read_attributes import require_still
 from stereocell.usd.read_objects import objects_of
 from stereocell.usd.typed_values import read_as, require_type
 
-# Most corners of a face. All its triangles meet at one corner, so the time to look for crossings
-# among them grows with the square of the number. Measured with `bundle` on 2 cores of an Intel Xeon
-# that other work shared: a flat face of 5000 corners took 90 s, one of 20 000 took 212 s.
+# Largest number of corners of a face. All triangles of a face share one corner, so the time to find
+# intersections among them grows with the square of the number. Measured with `bundle` on 2 shared
+# cores of an Intel Xeon: a flat face of 5000 corners took 90 s, one of 20 000 took 212 s.
 MAX_CORNERS = 20_000
 _Types = Sdf.ValueTypeNames
 _PRIMVARS = {
@@ -46,13 +46,13 @@ def read_mesh(
     shown: Collection[str] = (),
     is_edited: bool = False,
 ) -> Mesh | None:
-    """Return the mesh in world um, at the default time; None where it has no faces.
+    """Return the mesh in world um, at the default time; None if it has no faces.
 
     to_world   (4, 4), float64, for row vectors
-    shown      the primvars that its material reads: `displayColor`, `occlusion`
-    is_edited  drop the primvars that fit other faces
+    shown      primvars that the mesh's material reads: `displayColor`, `occlusion`
+    is_edited  leave out primvars that do not fit the faces, instead of raising an error
 
-    Raises StageError where its arrays contradict each other.
+    Raises StageError if the mesh's arrays contradict each other.
     """
     require_still(
         mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
@@ -105,7 +105,7 @@ def read_mesh(
         triangles, points, arrays = _split(path, points, indices, counts, corners, values)
     if "normals" not in arrays:
         arrays["normals"] = _smooth_normals(points, triangles)
-    if objects is not None and len(objects) != len(points):  # edits changed the faces
+    if objects is not None and len(objects) != len(points):  # an edit changed the faces
         objects = None
     return move_mesh(
         Mesh(
@@ -126,7 +126,7 @@ def read_mesh(
 def _require_faces(
     path: Sdf.Path, counts: NDArray[np.int64], indices: NDArray[np.int64], points: int
 ) -> None:
-    """Raise StageError where the faces of a mesh contradict its other arrays, or are too large."""
+    """Raise StageError if the faces contradict the other arrays or have too many corners."""
     if counts.min() < 3 or counts.sum() != len(indices):
         raise StageError(f"{path}: faceVertexCounts don't fit {len(indices)} faceVertexIndices")
     if (most := int(counts.max())) > MAX_CORNERS:
@@ -143,7 +143,7 @@ def _fitting(
 ) -> dict[str, _Values]:
     """Return the primvars that fit the faces of an edited mesh; normals are always kept.
 
-    sizes  the number of values by interpolation; one for each point where it is not named
+    sizes  number of values for each interpolation; all others have one value per point
     """
     kept = {
         name: (array, kind)
@@ -164,7 +164,7 @@ def _array(value: object, dtype: type) -> NDArray[Any]:
 
 
 def _normals(mesh: UsdGeom.Mesh) -> _Values | None:
-    """`primvars:normals` is stronger than `normals`."""
+    """Return the normals of a mesh. USD prefers `primvars:normals` to `normals`."""
     primvar = _primvar(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals"))
     value = read_as(mesh.GetNormalsAttr(), _Types.Normal3fArray)
     if primvar is not None or value is None:
@@ -187,10 +187,11 @@ def _find_seams(
     indices: NDArray[np.int64],
     points: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Return the point (n,) of each value by face corner, and the value of each corner.
+    """Find the vertices that the pipeline had before it joined them along the seams of charts.
 
-    The pipeline writes UVs and tangents with the same indices, each value for one point: these are
-    the vertices that it had before it joined them along the seams. None: the mesh has others.
+    Returns the point of each vertex (n,) and the vertex of each face corner (m,). The pipeline
+    writes UVs and tangents with the same indices and one value per vertex. Returns None if the mesh
+    has primvars by face corner that do not follow this scheme.
     """
     by_corner = [name for name, (_, kind) in values.items() if kind == "faceVarying"]
     others = [array for array, kind in values.values() if kind in ("vertex", "varying")]
@@ -218,7 +219,7 @@ def _primvar_values(primvars: UsdGeom.PrimvarsAPI, name: str) -> NDArray[np.floa
 def _at_vertices(
     values: dict[str, _Values], indices: NDArray[np.int64], counts: NDArray[np.int64], points: int
 ) -> dict[str, _Values]:
-    """Return the values by face that are the same all around each vertex, by vertex."""
+    """Convert values of faces to values of vertices, where all faces at each vertex agree."""
     found: dict[str, _Values] = {}
     for name, (array, kind) in values.items():
         if kind == "uniform" and len(array) == len(counts):
@@ -231,14 +232,14 @@ def _at_vertices(
 def _of_vertices(
     corners: NDArray[Any], indices: NDArray[np.int64], points: int
 ) -> NDArray[Any] | None:
-    """Return values of face corners as values of vertices; None: they differ at a vertex."""
+    """Convert values of face corners to values of vertices; None: they differ at a vertex."""
     moved = np.zeros((points, *corners.shape[1:]), corners.dtype)
     moved[indices] = corners
     return moved if np.array_equal(moved[indices], corners, equal_nan=True) else None
 
 
 def _triangulate(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the triangles of each face as a fan, (m, 3), as indices of face corners."""
+    """Split each face into a fan of triangles, and return their face corners (m, 3)."""
     starts = np.cumsum(counts) - counts
     if (counts == 3).all():
         return starts[:, np.newaxis] + np.arange(3)
@@ -256,10 +257,10 @@ def _split(
     corners: NDArray[np.int64],
     values: dict[str, _Values],
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], dict[str, NDArray[np.float32]]]:
-    """Give every face corner a vertex, and join vertices that are equal in all values.
+    """Make a vertex for each face corner, and merge vertices that are equal in all values.
 
-    Returns triangles (m, 3), points (n, 3) and the values per vertex. Raises StageError where a
-    number of values doesn't fit its interpolation.
+    Returns triangles (m, 3), points (n, 3) and the values per vertex. Raises StageError if the
+    number of values does not fit their interpolation.
     """
     columns = {"points": points[indices]}
     for name, (array, kind) in values.items():
@@ -299,7 +300,7 @@ def _smooth_normals(
 
 
 def move_mesh(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
-    """Return the mesh moved by a matrix for row vectors (4, 4). The identity keeps all bits."""
+    """Transform a mesh by a matrix (4, 4) for row vectors. The identity returns the mesh itself."""
     if np.array_equal(matrix, np.eye(4)):
         return mesh
     linear = matrix[:3, :3]

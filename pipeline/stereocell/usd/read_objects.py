@@ -1,4 +1,4 @@
-"""Read the objects of a composed stage: which vertex is whose, and the table's columns."""
+"""Read the objects of a composed stage: the object of each vertex, and the table's columns."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -30,12 +30,12 @@ _Types = Sdf.ValueTypeNames
 
 @dataclass(frozen=True, slots=True)
 class TileObjects:
-    """The objects of one tile, as the stage has them after all edits.
+    """The objects of one tile, after all edits.
 
-    labels   uint64 (n,)
-    names    by object; empty: there are none
-    values   float32 (n,) by column ID
-    touching  the walls of these objects, theirs the first label
+    labels    uint64 (n,), numbers in the label map
+    names     name of each object; empty: the objects have no names
+    values    float32 (n,) by column ID
+    touching  interfaces of these objects; the first label of a pair is the object in this tile
     """
 
     labels: NDArray[np.uint64]
@@ -45,9 +45,9 @@ class TileObjects:
 
 
 def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] | None:
-    """Return a channel's columns without values, and the one that colours first; None: no objects.
+    """Return a channel's columns without values, and the ID of the default column.
 
-    Raises StageError for a column that isn't described.
+    Returns None if the channel has no objects. Raises StageError for a column without a name.
     """
     prim = stage.GetPrimAtPath(specimen_of(stage).channels.AppendChild(channel_id))
     ids = read_as(prim.GetAttribute(COLUMNS), _Types.TokenArray)
@@ -81,7 +81,7 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
 
 
 def _colors_of(attribute: Usd.Attribute, data: dict[str, Any]) -> NDArray[np.float64]:
-    """Return the colours (n, 3) in 0..1 of a column's categories. Raises StageError."""
+    """Return the colours (n, 3) of a column's categories, clipped to 0..1. Raises StageError."""
     given = data.get("colors")
     if given is None:
         return np.zeros((0, 3))
@@ -90,7 +90,7 @@ def _colors_of(attribute: Usd.Attribute, data: dict[str, Any]) -> NDArray[np.flo
 
 
 def shown_objects(mesh: Usd.Prim) -> NDArray[np.bool_] | None:
-    """Return which of a tile's objects an edit has not hidden; None: the mesh has no objects."""
+    """Return a mask (n,) of a tile's objects that no edit hides; None: the mesh has no objects."""
     labels = read_as(mesh.GetAttribute(LABELS), _Types.UInt64Array)
     if labels is None:
         return None
@@ -102,7 +102,7 @@ def shown_objects(mesh: Usd.Prim) -> NDArray[np.bool_] | None:
 
 
 def without_hidden(mesh: Mesh, prim: Usd.Prim) -> Mesh | None:
-    """Return a tile's mesh without the objects that an edit has hidden; None: nothing is left."""
+    """Return a tile's mesh without hidden objects; None: all its objects are hidden."""
     shown = shown_objects(prim)
     if mesh.objects is None or shown is None or shown.all():
         return mesh
@@ -122,11 +122,9 @@ def without_hidden(mesh: Mesh, prim: Usd.Prim) -> Mesh | None:
 
 
 def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | None:
-    """Return what a tile's mesh, at the selected level, knows of its objects; None: nothing.
+    """Return the objects of a tile's mesh, at the selected level; None: it has no objects.
 
-    Those that an edit has hidden are left out.
-
-    Raises StageError where a column has another number of values.
+    Hidden objects are left out. Raises StageError if a column has the wrong number of values.
     """
     labels = read_as(mesh.GetAttribute(LABELS), _Types.UInt64Array)
     if labels is None:
@@ -155,7 +153,7 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
     pairs = np.array(list(touching or ()), np.uint64)
     if len(pairs) % 2:
         raise StageError(f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected pairs")
-    # stages of earlier versions have none
+    # Stages of earlier versions do not have the areas.
     given = read_as(mesh.GetAttribute(WALL_UM2), _Types.FloatArray, may_be_nan=True)
     areas = np.full(len(pairs) // 2, np.nan) if given is None else given
     if len(areas) != len(pairs) // 2:
@@ -174,7 +172,7 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
 
 
 def painter_of(stage: Usd.Stage, channel_id: str) -> str:
-    """Return the ID of the channel whose intensity objects' vertices have; empty: none is there."""
+    """Return the ID of the channel that colours the objects by its intensity; empty: none."""
     channels = specimen_of(stage).channels
     path = channels.AppendChild(channel_id)
     name = text_of(stage.GetPrimAtPath(path).GetAttribute(PAINTED_BY))
@@ -183,7 +181,7 @@ def painter_of(stage: Usd.Stage, channel_id: str) -> str:
 
 
 def objects_of(mesh: UsdGeom.Mesh) -> NDArray[np.int64] | None:
-    """Return which object each face is of (m,); None: the mesh has none."""
+    """Return the index of each face's object (m,); None: the mesh has no objects."""
     primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar(OBJECT_ID)
     if not primvar or primvar.GetInterpolation() != UsdGeom.Tokens.uniform:
         return None

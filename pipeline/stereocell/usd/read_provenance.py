@@ -1,4 +1,4 @@
-"""Read from a composed stage which source it was built from, and how its surfaces end."""
+"""Read the source's fingerprint from a composed stage, and whether its surfaces have caps."""
 
 import hashlib
 import re
@@ -6,14 +6,14 @@ from pathlib import Path
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
-_FINGERPRINT = re.compile(r"[0-9a-f]{16,64}")  # of provenance.json, in hexadecimal digits
+_FINGERPRINT = re.compile(r"[0-9a-f]{16,64}")  # hexadecimal digits, as in provenance.json
 
 
 def fingerprint_of(stage: Usd.Stage) -> str:
     """Return the fingerprint of the stage's source; empty: no layer states one.
 
-    The stage that a build wrote states it, and an artist's layer lies over that one. A stage that
-    is composed of several builds has a digest of all their fingerprints.
+    The layer that a build wrote states it, so a stage with artists' layers has it too. A stage that
+    is composed of several builds has a hash of all their fingerprints.
     """
     found = _fingerprints(stage)
     if len(found) < 2:
@@ -22,11 +22,11 @@ def fingerprint_of(stage: Usd.Stage) -> str:
 
 
 def note_on_source(stage: Usd.Stage, built: Path) -> str:
-    """Return a line where a composed stage shows another source than a built one; else empty.
+    """Return a message if a composed stage has another source than a built one; else empty.
 
-    built  the stage of the folder that the bundle goes to
+    built  stage.usda in the output folder of the bundle
     """
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # other checks report a damaged layer
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # other checks report damaged layers
     try:
         layer = Sdf.Layer.FindOrOpen(str(built))
     except Tf.ErrorException:
@@ -46,7 +46,7 @@ def _fingerprints(stage: Usd.Stage) -> list[str]:
 
 
 def has_caps(stage: Usd.Stage) -> bool:
-    """Return whether surfaces are closed at the block's faces; they are if no layer denies it."""
+    """Return whether surfaces are closed at the block's faces: true unless a layer denies it."""
     for layer in stage.GetUsedLayers():
         about = layer.customLayerData
         for name in ("stereocell", "settings", "surface", "caps"):

@@ -1,4 +1,4 @@
-"""Read the 2D transfer functions of a composed stage: parallel arrays, an entry for each shape."""
+"""Read the 2D transfer functions of a composed stage: arrays with one entry per shape."""
 
 from typing import Any
 
@@ -23,10 +23,10 @@ _TYPES = {
 
 
 def read_shapes(prim: Usd.Prim) -> Shapes:
-    """Return the shapes that a channel's chosen variant has; none: its function is 1D.
+    """Return the shapes of a channel's selected transfer function; empty: the function is 1D.
 
-    Only kinds and boxes are needed. Tips are then in the middle, colours the channel's, opaque, and
-    softness 0.5. Raises StageError.
+    Kinds and boxes are required. Without the other arrays, tips are in the middle of the values,
+    shapes have the channel's colour with opacity 1, and softness is 0.5. Raises StageError.
     """
     boxes = [tuple(shortest(number) for number in box) for box in _values(prim, _BOXES)]
     count = len(boxes)
@@ -50,12 +50,12 @@ def read_shapes(prim: Usd.Prim) -> Shapes:
     return tuple(shapes)
 
 
-def _values(prim: Usd.Prim, name: str) -> list[Any]:  # what USD holds there
+def _values(prim: Usd.Prim, name: str) -> list[Any]:  # items of the attribute's USD type
     return list(read_as(prim.GetAttribute(name), _TYPES[name]) or [])
 
 
 def _as_long(prim: Usd.Prim, name: str, count: int, default: list[Any] | None) -> list[Any]:
-    """Return an array that has an entry for each shape. Raises StageError."""
+    """Return an array with an entry for each shape, or the default. Raises StageError."""
     values = _values(prim, name)
     if not values and default is not None:
         return default

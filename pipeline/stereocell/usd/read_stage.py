@@ -1,7 +1,7 @@
 """Open a composed stage, with all layers that an artist put over it, and load its tiles.
 
-All values pass pxr's composition: colours, visibility, moved tiles, chosen variants. Surfaces and
-volumes of a loaded tile: read_levels.py, read_volume.py.
+USD composes all values: colours, visibility, moved tiles, selected variants. The surfaces and
+volumes of a loaded tile are read by read_levels.py and read_volume.py.
 """
 
 from collections.abc import Iterator
@@ -29,16 +29,17 @@ from stereocell.usd.specimen import find_specimen, specimen_of
 from stereocell.usd.typed_values import one_line, read_as, text_of
 from stereocell.usd.written_files import STAGE_NAME, AsWritten
 
-_SIDE_DIGITS = 9  # decimals of the unit vectors to a patient's sides: scanners state fewer
+_SIDE_DIGITS = 9  # decimals of unit vectors to a patient's sides: more than scanners state
 _Types = Sdf.ValueTypeNames
 
 
 def open_stage(path: Path) -> Usd.Stage:
     """Open a stage without its payloads.
 
-    Raises StageError where it can't, or for a layer of other units, up axis or default prim.
+    Raises StageError if the file is not a StereoCell stage or a layer over one, or if a layer has
+    other units, another up axis or another default prim.
     """
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # keeps USD from printing the errors, too
     try:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
     except Tf.ErrorException as error:
@@ -64,7 +65,7 @@ def open_stage(path: Path) -> Usd.Stage:
 
 
 def _require_places(stage: Usd.Stage) -> None:
-    """Raise StageError where a layer gives prims of the build another path by `relocates`."""
+    """Raise StageError if a layer moves prims of the build to another path by `relocates`."""
     root = specimen_of(stage).root
     for layer in stage.GetLayerStack(includeSessionLayers=False):
         for old, new in layer.relocates:
@@ -77,21 +78,21 @@ def _require_places(stage: Usd.Stage) -> None:
 
 
 def specimen_name(stage: Usd.Stage) -> str:
-    """Return the display name of the specimen; without one, its prim's name."""
+    """Return the specimen's display name, or else its prim's name."""
     root = stage.GetPrimAtPath(specimen_of(stage).root)
     return str(root.GetDisplayName() or root.GetName())
 
 
 def modality_of(stage: Usd.Stage) -> str:
-    """Return DICOM's code of the modality, `MR` or the like; empty: the stage states none."""
+    """Return DICOM's code of the modality, such as `MR`; empty: the stage states none."""
     return text_of(stage.GetPrimAtPath(specimen_of(stage).root).GetAttribute("stereocell:modality"))
 
 
 def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
-    """Return where the patient's sides are: unit vectors, world; None: the stage does not state it.
+    """Return unit vectors (x, y, z) to the patient's sides, world; None: the stage states none.
 
-    They are turned, and mirrored, as the group of the tiles is. Raises StageError for a side that
-    is no direction.
+    The vectors turn and mirror with the tiles' group. Raises StageError for a vector without a
+    length.
     """
     group = stage.GetPrimAtPath(specimen_of(stage).tiles)
     if PATIENT_API not in group.GetAppliedSchemas():
@@ -109,10 +110,10 @@ def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
 
 
 def opening_cut_of(stage: Usd.Stage) -> tuple[Point, float] | None:
-    """Return the plane that the specimen opens cut by: its unit normal, which leads to what is cut
-    away, and its offset, um, world; None: it opens whole.
+    """Return the clip plane that is active at opening; None: the specimen opens whole.
 
-    Raises StageError for a normal without a direction.
+    The plane is a unit normal (x, y, z), which points to the part that is cut away, and an offset
+    in um, both in the world. Raises StageError for a normal without a length, or a distant plane.
     """
     root = stage.GetPrimAtPath(specimen_of(stage).root)
     if root.GetAttribute(OPENING_CUT).Get() is None:
@@ -137,7 +138,7 @@ def tile_prims(stage: Usd.Stage) -> list[Usd.Prim]:
 def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the lower and upper corner (x, y, z), world um, of a tile's extentsHint.
 
-    The tile need not be loaded. Raises StageError where it has no hint or an invalid one.
+    The tile need not be loaded. Raises StageError if the hint is missing or invalid.
     """
     attribute = UsdGeom.ModelAPI(tile).GetExtentsHintAttr()
     hint = read_as(attribute, _Types.Float3Array, may_be_nan=True)
@@ -157,8 +158,8 @@ def loaded(
 
     as_written  the lists to compare the tile's files with; None: no comparison
 
-    Its meshes and volumes are both active, for any selection. Raises StageError where the
-    payload can't be composed, or where a layer differs from its list as a damaged one does.
+    Both meshes and volumes are active, whichever representation is selected. Raises StageError if
+    the payload can't be composed, or if a layer is missing or damaged.
     """
     path = specimen_of(stage).tiles.AppendChild(tile_id)
     with cached(Path(stage.GetRootLayer().realPath).parent / "tiles" / tile_id):
@@ -169,9 +170,9 @@ def loaded(
 
 
 def _require_names(tile: Usd.Prim) -> None:
-    """Raise StageError for a surface of the build that no reader finds, after a prim was renamed.
+    """Raise StageError for a surface that readers can't find because a prim was renamed.
 
-    A channel that is not active has no reader on purpose.
+    Surfaces are recognized by their API schema. Those of an inactive channel are no error.
     """
     stage = tile.GetStage()
     channels = specimen_of(stage).channels
@@ -191,13 +192,13 @@ def _require_names(tile: Usd.Prim) -> None:
 
 
 def _stage_folders(stage: Usd.Stage) -> list[Path]:
-    """Return the folders of a stage's layers, without its payloads."""
+    """Return the folders of a stage's layers, without those of payloads that are not loaded."""
     paths = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
     return sorted({Path(path).parent for path in paths})
 
 
 def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileChoice]]:
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the errors raised here
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # `require_composed` reports USD's errors
     stage.Load(path)
     del quiet
     try:

@@ -1,4 +1,4 @@
-"""Inputs of a surface shader of a composed stage other than plain values: images, vertex values."""
+"""Read the inputs of a surface shader that are not plain values: images, and primvars."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,17 +33,17 @@ class ComposedMaps:
 
 
 def maps_of(surface: UsdShade.Shader) -> ComposedMaps:
-    """Return the images that feed a surface. Raises StageError where one is missing."""
+    """Return the images that feed a surface. Raises StageError if a file is missing."""
     return ComposedMaps(*(_image(surface, kind) for kind in ("normal", "occlusion", "color")))
 
 
 def read_image(path: Path | NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return an image uint8 (y, x, 3), both edges multiples of 4, as Basis Universal requires.
+    """Return an image, uint8 (y, x, 3), for Basis Universal, which needs edges divisible by 4.
 
-    path  a file, which is resized where needed, or an image in memory, uint8, (y, x) or (y, x, 3),
-          with such edges
+    path  a file, which is resized if needed, or an image in memory, uint8, (y, x) or (y, x, 3),
+          with edges that are divisible by 4
 
-    Raises StageError where the file can't be read as an image.
+    Raises StageError if the file can't be read as an image.
     """
     if not isinstance(path, Path):
         return path if path.ndim == 3 else np.repeat(path[..., None], 3, axis=2)
@@ -59,7 +59,7 @@ def read_image(path: Path | NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def vertex_values_of(surface: UsdShade.Shader) -> set[str]:
-    """Return the primvars of the mesh that feed occlusion and colour, of those that we author."""
+    """Return which of the build's primvars feed a surface: `occlusion`, `displayColor`."""
     kinds: tuple[Kind, ...] = ("occlusion", "color")
     readers = {FEEDS[kind].primvar: (feeder(surface, kind), FEEDS[kind].reader) for kind in kinds}
     return {
@@ -72,7 +72,7 @@ def vertex_values_of(surface: UsdShade.Shader) -> set[str]:
 
 
 def feeder(surface: UsdShade.Shader, kind: Kind) -> UsdShade.Shader | None:
-    """Return the shader node whose output feeds an input of the surface; None: a plain value."""
+    """Return the shader whose output feeds an input of the surface; None: a plain value does."""
     given = surface.GetInput(FEEDS[kind].input)
     attributes: list[Usd.Attribute] = given.GetValueProducingAttributes() if given else []
     if not attributes or not UsdShade.Output.IsOutput(attributes[0]):

@@ -1,4 +1,4 @@
-"""Read the variants that an artist selected for a tile of a composed stage: two variant sets."""
+"""Read which variants of a tile are selected: its representation and its level of detail."""
 
 import re
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ _LOD = re.compile(r"lod(\d+)")
 class TileChoice:
     """The representation of a tile to draw, and the finest level of detail to show.
 
-    finest_lod  0: all levels. A stage selects `lod1` by default, so `lod1` means the same as
-                `lod0`; a coarser level is an artist's choice.
+    finest_lod  0: show all levels. A stage selects `lod1` by default, so `lod1` also gives 0. Only
+                a coarser level counts as an artist's choice.
     """
 
     representation: Representation
@@ -26,12 +26,12 @@ class TileChoice:
 
 
 def read_choice(tile: Usd.Prim) -> TileChoice:
-    """Return the selections of a loaded tile. Raises StageError for an unknown variant."""
+    """Return the selected variants of a loaded tile. Raises StageError for an unknown variant."""
     return TileChoice(_representation(tile), _finest_lod(tile))
 
 
 def lod_levels(tile: Usd.Prim) -> list[int]:
-    """Return a loaded tile's levels of detail, finest first; none: a flattened stage."""
+    """Return a loaded tile's levels of detail, finest first; empty: there are no variants."""
     names = tile.GetVariantSet("lod").GetVariantNames()
     return sorted(int(match[1]) for match in map(_LOD.fullmatch, names) if match)
 
@@ -50,8 +50,8 @@ def _representation(tile: Usd.Prim) -> Representation:
 
 
 def _what_is_active(tile: Usd.Prim) -> Representation:
-    """Return the drawn representation of a flattened tile, which has no variants any more."""
-    prims = list(Usd.PrimRange(tile))  # inactive prims are left out
+    """Return the representation of a flattened tile, which has no variants, by its prims."""
+    prims = list(Usd.PrimRange(tile))  # without inactive prims
     has_volume = any(prim.IsA(UsdVol.Volume) for prim in prims)
     if not has_volume:
         return "mesh"

@@ -1,8 +1,8 @@
-"""Read the cameras that a user's layers add to a stage: named views of the viewer, in order.
+"""Read the cameras that a user's layers add to a stage. They become named views in the viewer.
 
-The viewer's camera is upright and turns about a point of its axis, the one nearest to the
-specimen's middle. So a roll is not taken over. The three cameras of the build frame the whole
-specimen, as the viewer does by itself, and are no views.
+The viewer's camera is always upright, so a camera's roll is lost. It orbits the point of the
+camera's axis that is nearest to the specimen's middle. The three cameras of the build are left out:
+they frame the whole specimen, which the viewer does by itself.
 """
 
 from collections.abc import Iterator
@@ -18,16 +18,17 @@ from stereocell.usd.layer_opinions import defined_prims
 from stereocell.usd.read_attributes import Point, numbers_of
 from stereocell.usd.specimen import specimen_of
 
-_MAX_ROLL_DEG = 1.0  # degrees; a smaller roll is not seen
+_MAX_ROLL_DEG = 1.0  # degrees; a roll up to this angle is not noticed
 _OF_BUILD = ("mono", "left", "right")
 
 
 @dataclass(frozen=True, slots=True)
 class StageView:
-    """A view that a camera shows; lengths are um of the world.
+    """The view of a camera. Points (x, y, z) are in um of the world.
 
-    fov_deg  vertical field of view, degrees
-    roll_deg  turn about its axis, which is not taken over
+    target    point that the viewer's camera orbits
+    fov_deg   vertical field of view, degrees
+    roll_deg  rotation of the camera about its axis, degrees; the viewer ignores it
     """
 
     name: str
@@ -48,9 +49,11 @@ def is_view(prim: Usd.Prim) -> bool:
 def read_views(
     stage: Usd.Stage, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> Iterator[StageView]:
-    """Yield the views of a stage's visible cameras; low and high bound the specimen (x, y, z), um.
+    """Yield the views of a stage's visible cameras, in the stage's order.
 
-    Raises StageError for a camera without a lens or over time.
+    low, high  corners of the specimen's box (x, y, z), um, world
+
+    Raises StageError for a camera without a focal length or aperture, or with an animated place.
     """
     middle, longest = (low + high) / 2, float((high - low).max())
     for prim in defined_prims(stage):
@@ -73,14 +76,14 @@ def _view_of(prim: Usd.Prim, middle: NDArray[np.float64], longest: float) -> Sta
     ahead = float((middle - eye) @ forward)
     target = eye + forward * (ahead if ahead > 0 else longest)
     fov = 2 * np.degrees(np.arctan(aperture / (2 * focal)))
-    # The right-hand axis of an upright camera is level.
+    # The right-hand axis of an upright camera is horizontal.
     roll = np.degrees(np.arcsin(np.clip(right[1], -1, 1)))
     name = str(prim.GetDisplayName() or prim.GetName())
     return StageView(name, _point(eye), _point(target), round(float(fov), 4), float(roll))
 
 
 def notes_on_rolls(views: list[StageView]) -> Iterator[str]:
-    """Yield a line on each camera whose roll is lost."""
+    """Yield a message for each camera that loses a visible roll."""
     for view in views:
         if abs(view.roll_deg) > _MAX_ROLL_DEG:
             yield (

@@ -1,4 +1,4 @@
-"""Read where the voxels of a loaded tile are, and their place in the world."""
+"""Find the files with the voxels of a loaded tile, and the volume's place in the world."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,14 +21,15 @@ from stereocell.usd.typed_values import read_as
 
 @dataclass(frozen=True, slots=True)
 class ComposedVolume:
-    """One volume: the file with its voxels, and its place.
+    """The volume of a channel in one tile: its files and its place.
 
-    field       the .vdb that other programs draw; None: the stage names none
-    measured    the .vdb with the voxels as they were measured; None: they are not kept
-    size        voxels (x, y, z) with the apron
-    apron       voxels on each side
-    low, high   corners (x, y, z) in um of the box inside the apron, before `matrix`
-    matrix      (4, 4) for row vectors, to world um
+    atlas       image file with the voxels that the bundle shows
+    field       .vdb that other programs draw; None: the stage names none
+    measured    .vdb with the voxels as measured; None: the stage does not keep them
+    size        voxels (x, y, z), including the apron
+    apron       width of the border around the tile's own box, in voxels on each side
+    low, high   corners (x, y, z) of the box inside the apron, um, in the volume's own space
+    matrix      (4, 4) for row vectors, from the volume's own space to world um
     """
 
     atlas: Path
@@ -44,7 +45,7 @@ class ComposedVolume:
 def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
     """Return a loaded tile's volume of one channel; None if it is not drawn.
 
-    Raises StageError where its attributes are missing or contradict each other.
+    Raises StageError if attributes are missing or contradict each other.
     """
     name = f"{channel_id}_{tile.GetName()}_volume"
     prim = drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{name}"))
@@ -70,7 +71,7 @@ def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
 
 
 def _field_of(volume: Usd.Prim, name: str) -> Path | None:
-    """Return the file of a field of a volume; None where there is none."""
+    """Return the file of a volume's field; None: the volume has no such field or file."""
     path = UsdVol.Volume(volume).GetFieldPath(name)
     prim = volume.GetStage().GetPrimAtPath(path) if path else None
     path_of_file = UsdVol.FieldAsset(prim).GetFilePathAttr() if prim else None

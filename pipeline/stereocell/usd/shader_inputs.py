@@ -1,7 +1,7 @@
-"""Feed a surface shader from the mesh: images by its UVs, or values at its vertices.
+"""Connect images, or a mesh's values at vertices, to inputs of a surface shader.
 
-Stage and usdz share this shader network. All inputs feed the material's `surface`, a
-UsdPreviewSurface. Image files are PNG: colours in sRGB, all others raw.
+Stages and usdz files use the same shader network. Its inputs are those of the UsdPreviewSurface
+that is called `surface`. Image files are PNG: colours in sRGB, all others raw.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,15 @@ _Types = Sdf.ValueTypeNames
 
 @dataclass(frozen=True, slots=True)
 class _Feed:
-    """One kind's way into the shader: its input, the image's output, the primvar's name."""
+    """The names and types that connect one kind of value to the surface shader.
+
+    input        input of the surface shader, and its `type`
+    texture      name of the prim that reads the image
+    output       output of that prim, and its `output_type`
+    space        colour space of the image
+    primvar      primvar with values at vertices; empty: this kind has none
+    reader       shader ID that reads the primvar
+    """
 
     input: str
     type: Any
@@ -44,7 +52,7 @@ FEEDS: dict[Kind, _Feed] = {
 
 
 def feed_image(stage: Usd.Stage, look: Sdf.Path, kind: Kind, file: str) -> None:
-    """Feed an image to the surface shader of a material (`look`), by the mesh's `primvars:st`."""
+    """Connect an image to the surface shader of the material `look`; `primvars:st` are the UVs."""
     feed = FEEDS[kind]
     reader = UsdShade.Shader.Define(stage, look.AppendChild("st"))
     reader.CreateIdAttr("UsdPrimvarReader_float2")
@@ -71,9 +79,11 @@ def feed_vertices(
     values: NDArray[np.float32],
     indices: NDArray[np.int32] | None = None,
 ) -> None:
-    """Store values at a mesh's vertices, (n,) or (n, 3), float32, and feed them to its surface.
+    """Store values at a mesh's vertices, and connect them to its surface shader.
 
-    indices  (n,) of each vertex into `values`; None: as many values as vertices
+    look     path of the mesh's material
+    values   (n,) or (n, 3), float32
+    indices  (vertices,), the index into `values` for each vertex; None: one value per vertex
     """
     data = np.ascontiguousarray(values, dtype=np.float32)
     is_color = kind == "color"
@@ -89,7 +99,7 @@ def feed_vertices(
 
 
 def feed_primvar(mesh: UsdGeom.Mesh, look: Sdf.Path, kind: Kind) -> None:
-    """Feed the primvar of a kind, which the mesh has or gets, to its surface."""
+    """Connect the primvar of a kind to the surface shader. The mesh may get the primvar later."""
     feed, stage = FEEDS[kind], mesh.GetPrim().GetStage()
     reader = UsdShade.Shader.Define(stage, look.AppendChild(feed.primvar))
     reader.CreateIdAttr(feed.reader)

@@ -1,8 +1,8 @@
-"""Where the specimen stands in a composed stage.
+"""Find the prim of the specimen in a composed stage.
 
-A build writes it at /Specimen. A scene may reference the stage anywhere, under any name: then
-`find_specimen` looks for the one prim with the specimen's API schema. The place is kept in the
-session layer of the opened stage, from where all readers take it.
+A build writes it at /Specimen. A scene may reference the stage at any path. Then `find_specimen`
+searches for the one prim with the specimen's API schema. It stores the path in the session layer of
+the opened stage, where all readers look it up.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from stereocell.usd.layer import (
 )
 
 _KEY = "stereocellSpecimen"  # custom data of the session layer: path of the specimen's prim
-# Prims of instances too
+# Active and defined prims, including those of instances
 _PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract)
 
 
@@ -38,37 +38,37 @@ class Specimen:
 
     @property
     def channels(self) -> Sdf.Path:
-        """The group of the channels' materials."""
+        """The parent of the channels' materials."""
         return self._moved(CHANNELS)
 
     @property
     def shown(self) -> Sdf.Path:
-        """The group of prims whose visibility the channels' surfaces inherit."""
+        """The parent of the prims whose visibility the channels' surfaces inherit."""
         return self._moved(SHOWN)
 
     @property
     def classes(self) -> Sdf.Path:
-        """The group of the materials of objects' classes."""
+        """The parent of the materials for classes of objects."""
         return self._moved(CLASSES)
 
     @property
     def tiles(self) -> Sdf.Path:
-        """The group of the tiles."""
+        """The parent of the tiles."""
         return self._moved(TILES)
 
     @property
     def cameras(self) -> Sdf.Path:
-        """The group of the cameras."""
+        """The parent of the build's cameras."""
         return self._moved(CAMERAS)
 
     @property
     def lights(self) -> Sdf.Path:
-        """The group of the lights."""
+        """The parent of the build's lights."""
         return self._moved(LIGHTS)
 
     @property
     def top(self) -> str:
-        """The name of the root prim that is the specimen, or is above it."""
+        """The name of the root prim that is the specimen or contains it."""
         return str(self.root.GetPrefixes()[0].name)
 
 
@@ -79,10 +79,10 @@ def specimen_of(stage: Usd.Stage) -> Specimen:
 
 
 def find_specimen(stage: Usd.Stage) -> Specimen:
-    """Find the specimen of a stage, and keep its place for `specimen_of`.
+    """Find the specimen of a stage, and store its path for `specimen_of`.
 
-    Payloads above it are loaded. Raises StageError where there are several, or where it is an
-    instance, whose tiles can't be loaded one by one.
+    Payloads that contain it are loaded. Raises StageError if there are several specimens, or if it
+    is part of an instance, since tiles in instances can't be loaded one by one.
     """
     if stage.GetPrimAtPath(CHANNELS):
         _require_no_instance(stage.GetPrimAtPath(ROOT))

@@ -1,4 +1,4 @@
-"""The files that a stage names: its layers, selected or not, and its assets."""
+"""Find the files that a stage refers to: layers, also those of unselected variants, and assets."""
 
 from collections.abc import Iterator
 from itertools import chain
@@ -11,12 +11,13 @@ from stereocell.storage.location import Location, require_own
 
 
 def dependencies(path: Path, stage_dir: Path) -> list[Path]:
-    """Return every file of a stage: layers, including unselected ones, and assets.
+    """Return every file of a stage: layers, also those of unselected variants, and assets.
 
-    path       the stage's layer; `stage_dir` is the folder of the stage below it
+    path       layer to open, which may be an artist's layer over a stage
+    stage_dir  folder of the stage
 
     Only files in the folder of `path`, in `stage_dir` or below are opened. Raises StageError for a
-    file outside them. Files that can't be opened are skipped: `open_stage` reports them.
+    file outside them. Layers that can't be opened are not searched: `open_stage` reports them.
     """
     folders = [Location.of(path).folder, Location.of(stage_dir).folder]
     files, names, waiting = {path}, {str(path)}, [str(path)]
@@ -24,7 +25,8 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
     try:
         while waiting:
             for asset, name in _named_in(waiting.pop()):
-                file = Path(Ar.SplitPackageRelativePathOuter(name)[0])  # of an entry: its .usdz
+                # For a file inside a .usdz, this is the .usdz.
+                file = Path(Ar.SplitPackageRelativePathOuter(name)[0])
                 if name in names or not require_own(file, folders, named=asset, raised=StageError):
                     continue
                 files.add(file)
@@ -37,22 +39,22 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
 
 
 def may_be_image(file: Path) -> bool:
-    """Return whether a file of a stage may be, or hold, an image that feeds a surface.
+    """Return whether a file of a stage may be an image for a surface, or an archive with images.
 
-    Layers hold none, .vdb and .exr are volumes and transfer functions, and `read_image` reads no
-    .exr.
+    Layers hold no images, and .vdb and .exr files are volumes and transfer functions. `read_image`
+    can't read .exr either.
     """
     return file.suffix.lower() not in (".usd", ".usda", ".usdc", ".vdb", ".exr")
 
 
 def _named_in(name: str) -> Iterator[tuple[str, str]]:
-    """Yield the references of one layer: their names for messages, and the paths that USD opens."""
+    """Yield the files that a layer refers to: a name for messages, and the path that USD opens."""
     try:
         layer = Sdf.Layer.FindOrOpen(name)
         named = chain(*UsdUtils.ExtractExternalReferences(name)) if layer else ()
     except Tf.ErrorException:
         return
-    if layer and layer.expressionVariables:  # layers above can change the paths
+    if layer and layer.expressionVariables:  # stronger layers could change the paths
         raise StageError(f"{name}: expressionVariables: found some, expected paths without them")
     for asset in named:
         path = Sdf.ComputeAssetPathRelativeToLayer(layer, Sdf.Layer.SplitIdentifier(asset)[0])

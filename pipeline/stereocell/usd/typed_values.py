@@ -1,8 +1,8 @@
-"""Read values of a composed stage as the types that their readers expect.
+"""Read values of a composed stage, and check that they have the expected type.
 
-A layer over the stage may hold any type at any place: USD composes a text where the stage has a
-colour. All readers of a composed stage get values from `read_as`, so another type, or a number that
-is not finite, is one line that names the prim, the attribute and both types.
+A layer over the stage may hold a value of any type: USD does not mind a text where the stage has a
+colour. All readers get values from `read_as`. For a value of another type, or a number that is not
+finite, it raises an error of one line, which names the attribute.
 """
 
 from collections.abc import Iterator
@@ -21,10 +21,10 @@ _TEXTS = (Vt.StringArray, Vt.TokenArray)
 def read_as(
     attribute: Usd.Attribute | None, expected: Sdf.ValueTypeName, *, may_be_nan: bool = False
 ) -> Any:  # USD's type of the attribute
-    """Return an attribute's value at the default time; None: it has none.
+    """Return an attribute's value at the default time; None: it has no value.
 
-    expected    the type; its precision may be another, and a whole number may stand for a number
-    may_be_nan  whether numbers need not be finite, where NaN means that there is no value
+    expected    expected type; another precision is accepted, and an integer instead of a float
+    may_be_nan  whether NaN and infinite numbers are accepted
 
     Raises StageError for a value of another type.
     """
@@ -40,14 +40,17 @@ def read_as(
 
 
 def text_of(attribute: Usd.Attribute | None) -> str:
-    """Return an attribute's text; empty: it has none. Raises StageError for another type."""
+    """Return an attribute's text; empty: it has no value. Raises StageError for another type."""
     return str(read_as(attribute, Sdf.ValueTypeNames.String) or "")
 
 
 def require_type(
     where: object, value: object, expected: Sdf.ValueTypeName, *, may_be_nan: bool = False
 ) -> None:
-    """Raise StageError unless a value is of a type; `where` is its path. See `read_as`."""
+    """Raise StageError unless a value has the expected type; see `read_as`.
+
+    where  path of the attribute, for the message
+    """
     if not _is_of(value, expected):
         found = Sdf.GetValueTypeNameForValue(value) or type(value).__name__
         raise StageError(f"{where}: found a value of type {found}, expected {expected}")
@@ -86,7 +89,7 @@ def _is_number(expected: Sdf.ValueTypeName) -> bool:
 def usd_boundary(stage_path: Path) -> Iterator[None]:
     """Turn an error that USD raises inside the block into a StageError of one line.
 
-    Warnings of USD are not shown: our own lines say what is wrong with a stage.
+    Warnings of USD are not shown, since our own messages report what is wrong with a stage.
     """
     quiet = UsdUtils.CoalescingDiagnosticDelegate()
     try:
@@ -101,10 +104,10 @@ def usd_boundary(stage_path: Path) -> Iterator[None]:
 
 
 def one_line(error: object) -> str:
-    """Return USD's message of an error without line breaks and places in USD's source."""
+    """Return USD's message of an error, without line breaks and locations in USD's source."""
     args = error.args if isinstance(error, Tf.ErrorException) else ()
     try:
         text = "; ".join(entry.commentary for entry in args) or str(error)
-    except UnicodeDecodeError:  # the message quotes bytes that aren't text
+    except UnicodeDecodeError:  # the message quotes bytes that are not text
         text = "a layer or a file of it is damaged"
     return " ".join(text.split()).removesuffix(".")

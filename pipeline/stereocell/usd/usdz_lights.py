@@ -1,11 +1,12 @@
 """Copy the lights of a composed stage into a specimen.usdz.
 
-A usdz is scaled, so only lights without a position keep their effect: distant lights and domes.
-Images in formats that usdz does not allow are left out.
+The specimen is scaled in a usdz, so only lights without a position keep their effect: distant
+lights and domes. Sphere lights, and images in formats that usdz does not allow, are left out.
 
-USD's own renderer, Storm, opens no OpenEXR image inside an archive (USD 25.08: the dome is black).
-So an image of at most MAX_RATIO becomes a PNG, and the light's intensity is raised by as much as
-the values were lowered. An image of a larger range, such as one with the sun in it, stays as it is.
+Storm, USD's own renderer, can't open OpenEXR images inside an archive (USD 25.08: the dome is
+black). So an OpenEXR image becomes a PNG if its largest value is at most MAX_RATIO times its mean.
+Its values are divided by the largest one, and the light's intensity is multiplied by it. An image
+with a larger range, such as one with the sun in it, is not converted.
 
 References: OpenUSD, Usdz File Format Specification, https://openusd.org/release/spec_usdz.html
 """
@@ -25,14 +26,14 @@ from stereocell.usd.read_lights import visible_lights
 from stereocell.usd.typed_values import read_as
 from stereocell.usd.written_files import AsWritten
 
-MAX_RATIO = 64.0  # largest value to the mean: 8 bits of sRGB then hold the mean within 4 %
+MAX_RATIO = 64.0  # largest value / mean, up to which 8-bit sRGB holds the mean within 4 %
 _IMAGES = (".exr", ".png", ".jpg", ".jpeg")
 
 
 def copy_lights(composed: Usd.Stage, small: Usd.Stage, as_written: AsWritten) -> dict[str, bytes]:
-    """Define the visible lights of a composed stage in the stage of a usdz.
+    """Copy the visible lights of a composed stage into the stage of a usdz.
 
-    Returns the images of the lights by their names in the archive. Raises StageError for a damaged
+    Returns the images of the lights by file name in the archive. Raises StageError for a damaged
     image.
     """
     images: dict[str, bytes] = {}
@@ -74,7 +75,7 @@ def _copy_light(light: Usd.Prim, small: Usd.Stage, as_written: AsWritten) -> dic
 
 
 def _pack_image(file: Path) -> tuple[str, bytes, float]:
-    """Return the ending and the content of a light's image, and what its intensity is times.
+    """Return the suffix and content of a light's image, and a factor for the light's intensity.
 
     Raises StageError.
     """
@@ -87,7 +88,7 @@ def _pack_image(file: Path) -> tuple[str, bytes, float]:
 
 
 def _encode_png(pixels: NDArray[np.float32]) -> bytes:
-    """Return linear values from 0 to 1, (height, width, 3), as a PNG, whose values are sRGB's."""
+    """Encode linear values from 0 to 1, (height, width, 3), as an sRGB PNG."""
     encoded = np.where(
         pixels <= 0.0031308, pixels * 12.92, 1.055 * np.maximum(pixels, 1e-9) ** (1 / 2.4) - 0.055
     )
@@ -97,6 +98,6 @@ def _encode_png(pixels: NDArray[np.float32]) -> bytes:
 
 
 def _type_of(light: Usd.Prim, attribute: Usd.Attribute) -> Sdf.ValueTypeName:
-    """Return the type that a light's schema has for an attribute, or the attribute's own."""
+    """Return the type of an attribute by the light's schema, or else the attribute's own type."""
     known = light.GetPrimDefinition().GetAttributeDefinition(attribute.GetName())
     return known.GetTypeName() if known else attribute.GetTypeName()

@@ -1,13 +1,17 @@
-"""Check a stage: every validator that USD ships, and the faults that they miss.
+"""Check a stage by all validators of USD and by checks of our own.
 
-USD's validators find missing files (in unselected variants too) and faults of metadata, of API
-schemas and of nesting. They miss units that differ between layers, selections of variants that
-don't exist, wrong counts, indices and extents, names that are unique only within their folder, and
-fields whose grid is missing in their .vdb: this module checks those. No validator needs an
-exception: the output of usd/write_stage.py passes all of them.
+USD's validators find missing files (also in unselected variants) and faults of metadata, API
+schemas and nesting. The checks in this module find faults that USD's validators miss:
 
-Both run once for each level of detail, since each has its own geometry; the channels' transfer
-functions alternate with the levels, and meshes and volumes are active together.
+- layers with different units, and selected variants that do not exist
+- wrong counts, indices and extents
+- names that two drawn prims share
+- fields whose grid is missing in their .vdb
+
+The output of usd/write_stage.py passes all validators without exceptions.
+
+All checks run once for each level of detail, since each level has its own geometry. Each run also
+selects another transfer function of the channels. Meshes and volumes are always both active.
 """
 
 import math
@@ -27,15 +31,15 @@ from stereocell.usd.layer import CHANNEL_API, METERS_PER_UNIT, UP_AXIS
 from stereocell.usd.typed_values import one_line, read_as
 
 _Types = Sdf.ValueTypeNames
-# a volume's box, without the namespace
+# Attributes of a volume's box, without their namespace
 _BOX = {"boundsMin": _Types.Double3, "boundsMax": _Types.Double3, "atlasSize": _Types.Int3}
 _ALL_SHOWN = {"representation": "both"}
-_TOLERANCE = 1e-4  # share of a box's size: extents are float32
+_TOLERANCE = 1e-4  # tolerance for extents, which are float32, as a share of the box's size
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One fault. `rule` names the validator; `where` is a prim, a property or a layer."""
+    """One fault. `rule` names the check; `where` is the path of a prim, a property or a layer."""
 
     rule: str
     where: str
@@ -46,8 +50,8 @@ class Finding:
 
 
 def validate_stage(path: Path) -> list[Finding]:
-    """Return the faults of a stage with all its payloads; an empty list: the stage is valid."""
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print the findings, too
+    """Return the faults of a stage with all its payloads; empty: the stage is valid."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # keeps USD from printing the findings, too
     findings: list[Finding] = []
     try:
         stage = Usd.Stage.Open(str(path))
@@ -63,9 +67,9 @@ def validate_stage(path: Path) -> list[Finding]:
 
 
 def validate_usdz(path: Path) -> list[Finding]:
-    """Return the faults of a specimen.usdz by USD's validators, those of usdz included, and ours.
+    """Return the faults of a specimen.usdz, found by USD's validators and by our own checks.
 
-    Its units are metres, as AR viewers expect, and all of it is drawn at once.
+    Its unit must be the metre, as AR viewers expect. It has no variants, so one run is enough.
     """
     quiet = UsdUtils.CoalescingDiagnosticDelegate()
     try:
@@ -90,7 +94,7 @@ def validate_usdz(path: Path) -> list[Finding]:
 
 
 def _check_all(stage: Usd.Stage) -> Iterator[Finding]:
-    """Yield the faults of the stage with the variants that are selected now."""
+    """Yield the faults of the stage with its currently selected variants."""
     yield from _check_layers(stage)
     yield from _run_validators(stage)
     yield from _check_names(stage)
@@ -134,7 +138,7 @@ def _name_layer(layer: Sdf.Layer) -> str:
 
 
 def _check_layers(stage: Usd.Stage) -> Iterator[Finding]:
-    """Yield layers with other units, up axis or default prim than the stage: USD never rescales."""
+    """Yield layers with wrong units, up axis or default prim: USD does not convert them."""
     session = stage.GetSessionLayer()
     for layer in sorted(stage.GetUsedLayers(), key=_name_layer):
         if layer == session:
@@ -154,7 +158,10 @@ def _check_layers(stage: Usd.Stage) -> Iterator[Finding]:
 
 
 def _check_names(stage: Usd.Stage) -> Iterator[Finding]:
-    """Yield names that two drawn prims share: clients that flatten the tree rename one of them."""
+    """Yield prims whose name another drawn prim has, too.
+
+    Programs that flatten the tree would rename one of them.
+    """
     leaves = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Gprim)]
     counts = Counter(prim.GetName() for prim in leaves)
     for prim in leaves:
@@ -174,9 +181,10 @@ def _check_selections(stage: Usd.Stage) -> Iterator[Finding]:
 
 
 def _select_variants(stage: Usd.Stage, turn: int) -> int:
-    """Select the `turn`-th variant of every set, in the session; return the number of turns.
+    """Select variant number `turn` of every variant set, in the session layer.
 
-    A set with fewer variants stays at its last.
+    A set with fewer variants keeps its last one. The representation is always `both`. Returns the
+    number of turns: the size of the largest set.
     """
     session = stage.GetSessionLayer()
     chosen: list[tuple[Sdf.Path, str, str]] = []
@@ -239,9 +247,13 @@ def _is_inside_out(
     indices: NDArray[np.float64],
     normals: NDArray[np.float64],
 ) -> bool:
-    """Return whether a mesh of triangles was mirrored without reversing its faces.
+    """Return whether most faces of a triangle mesh point against the normals at their vertices.
 
-    points   (n, 3); `counts` is (m,), `indices` (3 m,)
+    This happens if a mesh is mirrored without reversing its faces.
+
+    points   (n, 3)
+    counts   (m,), corners of each face
+    indices  (3 m,), vertices of the faces
     normals  (n, 3), at the vertices
     """
     if len(counts) == 0 or (counts != 3).any() or len(normals) != len(points):
@@ -280,15 +292,16 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
     if (cells < 1).any() or (box[1] <= box[0]).any():
         yield Finding("volume", where, f"atlas of {list(size)} voxels in a box of {box.tolist()}")
         return
-    # a volume's own voxels end half a voxel outside or inside the lattice's box
+    # The box goes from voxel centre to voxel centre, but the extent goes to the voxels' faces. So
+    # they differ by half a voxel.
     yield from _check_extent(volume, where, box, 0.5 * (box[1] - box[0]) / cells)
 
 
 def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Finding]:
-    """Yield fields whose file lacks the grid or states other units: clients draw nothing then."""
+    """Yield fields whose file lacks the grid or has another spacing: programs then draw nothing."""
     where, file = str(asset.GetPath()), read_as(asset.GetFilePathAttr(), _Types.Asset)
     if file is None or not file.resolvedPath:
-        return  # a validator of USD's reports it
+        return  # one of USD's validators reports it
     try:
         grids = read_vdb_head(Path(file.resolvedPath))
     except StageError as error:
@@ -308,7 +321,7 @@ def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Findin
 
 
 def _voxel_spacing(volume: Usd.Prim) -> NDArray[np.float64] | None:
-    """Return the voxel spacing (x, y, z), um, by the volume's own attributes; None if missing."""
+    """Return the voxel spacing (x, y, z), um, by a volume's attributes; None if it lacks them."""
     low, high, size, apron = _box_of(volume)
     if low is None or high is None or size is None:
         return None
@@ -317,7 +330,10 @@ def _voxel_spacing(volume: Usd.Prim) -> NDArray[np.float64] | None:
 
 
 def _box_of(volume: Usd.Prim) -> tuple[Any, Any, Any, int]:
-    """Return the corners of a volume's box, its voxels and its apron; None where it lacks one."""
+    """Return the corners of a volume's box, its size in voxels, and its apron.
+
+    An attribute that the volume lacks is None, or 0 for the apron.
+    """
     low, high, size = (
         read_as(volume.GetAttribute(f"stereocell:{name}"), kind) for name, kind in _BOX.items()
     )
@@ -363,7 +379,7 @@ def _check_opacity(prim: Usd.Prim) -> Iterator[Finding]:
 
 
 def _place(prim: Usd.Prim) -> str:
-    """Return the prim's path and, inside a tile, the level of detail that is selected."""
+    """Return the prim's path and, inside a tile, the selected level of detail."""
     for ancestor in prim.GetPath().GetPrefixes():
         variants = prim.GetStage().GetPrimAtPath(ancestor).GetVariantSets()
         if variants.HasVariantSet("lod"):
@@ -372,7 +388,7 @@ def _place(prim: Usd.Prim) -> str:
 
 
 def _array(attribute: Usd.Attribute, kind: Sdf.ValueTypeName) -> NDArray[np.float64]:
-    """Return the value as float64, (n,) or (n, width); n = 0 for an attribute without a value.
+    """Return an attribute's value as float64, (n,) or (n, width); n = 0 if it has no value.
 
     Raises StageError for a value of another type.
     """

@@ -1,21 +1,22 @@
-"""Write the appearances of a stage: looks/channels.usda, the one place where a channel's lives.
+"""Write looks/channels.usda, which has the appearances of all channels.
 
 Each channel is a material below /Specimen/Channels that the materials of all tiles inherit. The
-colour is an input of the material, which volume renderers and the bundle read. The shader `surface`
-repeats the colour as a plain value, because Blender's importer and small viewers don't follow a
-connection to the material's interface. Storm draws `surface_live` instead, the same shader with
-such a connection, so that an edited interface shows at once. The reader takes the interface where
-it was edited, see usd/read_appearances.py. The opacity points are the transfer function; the LUT is
-baked from them. A variant with shapes is a 2D function; its opacity points replace it where
-gradients are unknown.
+channel's colour is the material's `inputs:color`, which volume renderers and the bundle read. The
+shader `surface` repeats the colour as a plain value, because Blender's importer and small viewers
+do not follow connections to the material. Storm draws the shader `surface_live`, which does have
+such a connection, so an edit of `inputs:color` shows at once. If both colours were edited, the
+bundle uses `inputs:color`, see usd/read_appearances.py.
 
-The material has no volume output: USD ships no volume shader that renderers agree on, only
-UsdPreviewSurface. So the binding of a Volume prim to its appearance hands over the channel's values
-(colour, opacity points, LUT), and does NOT make a renderer draw the volume by them: an artist
-connects `outputs:volume` to the renderer's own shader, in a layer over the stage, and feeds its
-colour from `inputs:color`. The bundle's viewer has its own ray caster. docs/stage-volumes.md lists
-all that was tried (usd-core's validators refuse every shader that a renderer knows), and has such
-a layer.
+The opacity points are the transfer function, and the LUT is computed from them. A variant with
+shapes is a 2D function. Its opacity points are used where gradients are not known.
+
+The material has no volume output, since USD defines no volume shader that renderers share. A
+Volume prim is bound to its material so that programs find the channel's values (colour, opacity
+points, LUT). The binding alone does NOT make a renderer draw the volume. An artist has to connect
+`outputs:volume` to the renderer's own shader, in a layer over the stage, and `inputs:color` to the
+shader's colour. There is an example of this layer in docs/stage-volumes.md. The page also lists the
+shaders that were tried: USD's validators refuse all that renderers know. The bundle's viewer has
+its own ray caster.
 """
 
 from collections.abc import Mapping, Sequence
@@ -54,7 +55,7 @@ def write_appearances(
 ) -> None:
     """Write channels.usda, <channel>_<function>.exr and <channel>_level.json into `folder`.
 
-    tables  of the objects of label maps, by the ID of their channel
+    tables  object tables of label maps, by channel ID
 
     Raises OutputError.
     """
@@ -91,7 +92,7 @@ def _level_name(appearance: Appearance) -> str:
 
 
 def level_to_json(level: SurfaceLevel) -> dict[str, Any]:
-    """Return all that is needed to find the surface again in the source's voxels."""
+    """Return the parameters with which the surface can be extracted again from the source."""
     return {
         "format": "stereocell-level",
         "version": 1,
@@ -146,7 +147,7 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
 
 
 def _author_surface(material: UsdShade.Material, is_fed: bool) -> None:
-    # where tiles feed the colour, an opinion here would be stronger than theirs
+    # No colour is written if the tiles' maps or primvars feed it: it would be stronger than them.
     color = None if is_fed else material.GetInput("color").Get()
     surface = define_surface(material, color)
     if color is not None:
@@ -155,9 +156,9 @@ def _author_surface(material: UsdShade.Material, is_fed: bool) -> None:
 
 
 def _author_live_surface(material: UsdShade.Material, surface: UsdShade.Shader) -> None:
-    """Write the surface that Storm draws: as `surface`, but connected to the material's colour.
+    """Write the shader that Storm draws: `surface` with a connection to the material's colour.
 
-    It inherits from `surface`, so that maps which a tile connects to `surface` reach it as well.
+    It inherits from `surface`, so it also has the maps that a tile connects to `surface`.
     """
     stage, path = material.GetPrim().GetStage(), material.GetPath().AppendChild("surface_live")
     live = UsdShade.Shader.Define(stage, path)
@@ -183,7 +184,7 @@ def _author_functions(prim: Usd.Prim, appearance: Appearance) -> None:
 
 
 def _author_shapes(prim: Usd.Prim, shapes: Shapes) -> None:
-    """Write a 2D function as parallel arrays, see docs/transfer-functions.md."""
+    """Write a 2D function as arrays with one entry per shape, see docs/transfer-functions.md."""
     boxes = [Gf.Vec4f(*shape.values, *shape.gradients) for shape in shapes]
     colors = [Gf.Vec4f(*shape.color, shape.opacity) for shape in shapes]
     for name, kind, values in (

@@ -1,11 +1,13 @@
-"""Write display.usda: the stage at a size that stands beside everyday things.
+"""Write display.usda: the stage enlarged to the size of everyday objects.
 
-A specimen of 67 um lies in true size below the clipping plane of most cameras. display.usda is in
-metres; it references stage.usda and carries the display scale as a transform, so that the stage
-itself stays in true size. Its root has the specimen's name, since it is the one that scenes
-reference; edits address /Specimen of stage.usda, whose name is the same for all specimens, so a
-layer fits the next build and another specimen. Its cameras are its own: USD scales the place of a
-camera below a transform, but not its clipping range.
+A specimen of 67 um in true size is nearer than the near clipping plane of most cameras.
+display.usda is in metres. It references stage.usda and enlarges it by a transform, so stage.usda
+itself stays in true size.
+
+Scenes reference display.usda, so its root prim has the specimen's name. Edits belong to /Specimen
+of stage.usda, which has the same name for all specimens. So a layer with edits also fits the next
+build or another specimen. The file has its own cameras, since a transform moves a camera but does
+not scale its clipping range.
 """
 
 from pathlib import Path
@@ -30,13 +32,13 @@ def write_display(
 ) -> None:
     """Write display.usda beside stage.usda.
 
-    name       of the specimen; the root prim has this name, as far as a prim's name can
-    version    of the asset, the same as in stage.usda
-    box        (2, 3), lower and upper corner of the specimen (x, y, z), world um
-    shown      (2, 3), lower and upper corner of what is visible, which the cameras frame
-    scale      factor by which the specimen is enlarged
+    name     display name of the specimen; the root prim's name is made from it
+    version  version of the asset, the same as in stage.usda
+    box      (2, 3), lower and upper corner (x, y, z) of the specimen, world um
+    shown    (2, 3), lower and upper corner of the visible content, which the cameras frame
+    scale    factor by which the specimen is enlarged
 
-    Raises OutputError where it can't be written.
+    Raises OutputError if the file can't be written.
     """
     layer = Sdf.Layer.CreateAnonymous(".usda")
     display = Sdf.Path.absoluteRootPath.AppendChild(Tf.MakeValidIdentifier(name))
@@ -65,7 +67,7 @@ def write_display(
     hidden.active = False
     group = display.AppendChild(CAMERAS.name)
     define_cameras(stage, box * factor, shown * factor, group=group, unit_m=1.0)
-    del stage  # the reference only resolves beside the file
+    del stage  # the reference would not resolve for a layer in memory
     reference = layer.GetPrimAtPath(specimen.GetPath()).referenceList
     reference.prependedItems.append(Sdf.Reference(f"./{STAGE_NAME}"))
     export(layer, stage_dir / DISPLAY_NAME)

@@ -1,13 +1,14 @@
-"""Write nvindex.usda: the stage with transfer functions as NVIDIA IndeX reads them, in Omniverse.
+"""Write nvindex.usda: the stage with transfer functions for NVIDIA IndeX in Omniverse.
 
-The names are IndeX's own. A prim of type `Colormap` has points of RGBA over the domain of a field.
-A shader hands it to the material's output `nvindex:volume`. Volume prims ask to be drawn together
-with surfaces by `nvindex:composite`, and RTX leaves them out by `omni:rtx:skip`. The renderer's own
-switch stands in the layer's custom data, which Omniverse reads from the layer that it opens.
+All names are defined by IndeX. A prim of type `Colormap` has RGBA values at points of a field's
+domain. A shader connects it to the material's output `nvindex:volume`. The attribute
+`nvindex:composite` makes IndeX draw a volume together with surfaces, and `omni:rtx:skip` makes RTX
+leave it out. The layer's custom data switch the renderer on. Omniverse reads them only from the
+layer that it opens.
 
-This is a layer of its own: shaders of IndeX have no `info:id`, which validators of stages demand,
-and without IndeX the volumes would be skipped. No renderer of NVIDIA's was available, so no picture
-of it was seen.
+This is a separate layer for two reasons. Shaders of IndeX have no `info:id`, which the validators
+of stages require. Without IndeX, the volumes would not be drawn at all. NVIDIA's renderers were
+not available, so the result was never seen.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,7 +20,7 @@ from stereocell.model.channel import Appearance
 from stereocell.usd.layer import CHANNELS, ROOT, TILES, export, new_stage, set_attribute
 from stereocell.usd.written_files import NVINDEX_NAME, STAGE_NAME
 
-_DOMAIN = (0.0, 1.0)  # values of the grid `density`
+_DOMAIN = (0.0, 1.0)  # range of values of the grid `density`
 _NOTE = """The stage for NVIDIA IndeX: colour maps of all channels, and volumes drawn by it.
 Edits belong in a layer over stage.usda; the colour maps are those of the build."""
 _SETTINGS = {"rtx:index:compositeEnabled": True, "rtx:index:compositeDepthMode": 3}
@@ -32,9 +33,9 @@ def write_nvindex(
 ) -> None:
     """Write nvindex.usda beside stage.usda.
 
-    appearances  of the channels that have volumes
+    appearances  appearances of the channels that have volumes
 
-    Raises OutputError where it can't be written.
+    Raises OutputError if the file can't be written.
     """
     stage = new_stage(".usda", ROOT.name)
     for appearance in appearances:
@@ -48,7 +49,7 @@ def write_nvindex(
     layer = stage.GetRootLayer()
     layer.documentation = _NOTE
     layer.customLayerData = {"renderSettings": _SETTINGS}
-    del stage  # the sublayer's path only resolves beside the file
+    del stage  # the sublayer would not resolve for a layer in memory
     layer.subLayerPaths = [f"./{STAGE_NAME}"]
     export(layer, stage_dir / NVINDEX_NAME)
 

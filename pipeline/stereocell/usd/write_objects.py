@@ -1,12 +1,12 @@
-"""Write the objects of a label map into a stage: which face is whose, and the table's columns.
+"""Write the objects of a label map into a stage: the object of each face, and the table's columns.
 
-Columns are indexed uniform primvars: a value an object, an index a face. A constant array of values
-would arrive in Blender as values of the first points; values expanded to the faces would take three
-times the bytes. Categories are codes, and each is a GeomSubset with a material of its own, which
-DCC tools show as a material slot.
+Columns are indexed uniform primvars: one value per object, and one index per face. Blender would
+read a constant array as values of the first points. Values that are repeated for each face would
+take three times the bytes. Categories are numbers. Each category is also a GeomSubset with its own
+material, which DCC tools show as a material slot.
 
-On the channel's prim stands what the columns mean: see `write_columns`. That prim is a material,
-which holds no other one: the classes' materials are below CLASSES.
+The channel's prim has the meaning of the columns, see `write_columns`. That prim is a material, and
+a material can't contain others, so the materials of classes are below CLASSES.
 """
 
 import numpy as np
@@ -21,32 +21,34 @@ from stereocell.usd.layer import CLASSES, set_attribute
 from stereocell.usd.preview_surface import define_surface
 from stereocell.usd.primvar_names import OBJECT_ID, PAINT
 
-LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
-NAMES = "stereocell:objectNames"  # on a tile's mesh, too
-TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
-WALL_UM2 = "stereocell:objectWallAreas"  # and the area of each of these walls, um^2
-HIDDEN = "stereocell:hiddenObjects"  # on a channel's prim, by an edit: labels that are left out
+# Attributes of a tile's mesh
+LABELS = "stereocell:objectLabels"  # number of each object in the label map
+NAMES = "stereocell:objectNames"  # name of each object
+TOUCHING = "stereocell:objectWalls"  # pairs of labels whose objects share an interface
+WALL_UM2 = "stereocell:objectWallAreas"  # um^2, area of each of these interfaces
+# Attributes of a channel's prim
+HIDDEN = "stereocell:hiddenObjects"  # labels of objects that an edit hides
 COLUMNS, DEFAULT = "stereocell:columns", "stereocell:defaultColumn"
 COLUMN = "stereocell:column:"
-MAX_CLASSES = 32  # categories that are GeomSubsets: each is a prim in each level of each tile
+MAX_CLASSES = 32  # most categories as GeomSubsets: each adds a prim to each level of each tile
 _FAMILY = UsdShade.Tokens.materialBind
 
 _Types = Sdf.ValueTypeNames
 
 
 def class_name(column: Column, code: int) -> str:
-    """Return the name of the prim of a category."""
+    """Return the name of a category's prims: its GeomSubset and its material."""
     return f"class_{to_identifier(column.categories[code])}"
 
 
 def classes_of(table: ObjectTable) -> Column | None:
-    """Return the column whose categories are GeomSubsets; None: there is none."""
+    """Return the default column if its categories become GeomSubsets; else None."""
     column = table.column(table.default)
     return column if column is not None and 0 < len(column.categories) <= MAX_CLASSES else None
 
 
 def write_columns(prim: Usd.Prim, table: ObjectTable) -> None:
-    """Write what the columns of a channel's objects mean, and the materials of its classes."""
+    """Write the meaning of the columns of a channel's objects, and the materials of its classes."""
     ids = Vt.TokenArray([column.id for column in table.columns])
     set_attribute(prim, COLUMNS, _Types.TokenArray, ids, custom=True)
     set_attribute(prim, DEFAULT, _Types.Token, table.default, custom=True)
@@ -80,9 +82,10 @@ def define_objects(
     table: ObjectTable,
     touching: SharedWalls | None,
 ) -> None:
-    """Write what all levels of a tile's objects share: their numbers, names and classes' looks.
+    """Write the data of objects that all levels share: labels, names, interfaces, class materials.
 
-    touching  the walls of these objects; None: not known
+    look      path of the mesh's material; those of the classes stand beside it
+    touching  interfaces of these objects; None: not known
     """
     prim = mesh.GetPrim()
     set_attribute(prim, LABELS, _Types.UInt64Array, _uint64(table.labels), custom=True)
@@ -112,9 +115,10 @@ def write_objects(
     table: ObjectTable,
     kept: NDArray[np.int64],
 ) -> None:
-    """Write one level's objects: primvars, colours and classes.
+    """Write the objects of one level: columns, colours and classes, as primvars and GeomSubsets.
 
-    kept  the vertices of `made` that are points of `mesh`
+    made  mesh before its seams were joined
+    kept  indices of the vertices of `made` that are points of `mesh`
     """
     assert made.objects is not None
     of_face = made.objects[made.triangles[:, 0]].astype(np.int32)

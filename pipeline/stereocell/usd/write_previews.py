@@ -1,11 +1,11 @@
-"""Draw a specimen for browsers of assets, and cards that stand for it in heavy scenes.
+"""Draw a thumbnail of a specimen, and cards that replace it in large scenes.
 
-previews/thumbnail.png   named by the root's AssetPreviewsAPI
-previews/card_xpos.png   and the other five sides: the cards of UsdGeomModelAPI
+previews/thumbnail.png   thumbnail for asset browsers, by the root's AssetPreviewsAPI
+previews/card_xpos.png   and five other sides: cards of UsdGeomModelAPI
 
-Both show the surfaces that `specimen.usdz` has. A scene that sets the root's `model:drawMode` to
-`cards` sees a box with the six pictures in place of the specimen. The pictures have the bytes that
-the surfaces give, on every machine.
+All images show the surfaces of `specimen.usdz`. If a scene sets the root's `model:drawMode` to
+`cards`, it shows a box with the six cards instead of the specimen. The same surfaces give the same
+bytes on every machine.
 """
 
 from pathlib import Path
@@ -24,12 +24,13 @@ from stereocell.usd.read_stage import hinted_box, open_stage, tile_prims
 from stereocell.usd.write_usdz import find_parts
 from stereocell.usd.written_files import STAGE_NAME, AsWritten
 
-PREVIEWS = "previews"  # the folder beside stage.usda
+PREVIEWS = "previews"  # folder beside stage.usda
 _THUMBNAIL = "thumbnail.png"
 _THUMBNAIL_WIDTH = 512  # pixels
-_CARD_EDGE = 512  # pixels, the longer edge of a card
-# Each side of the box: directions to the right, up and to the eye of an upright picture, and the
-# quarter turns against the clock that it takes to lie on the card as USD maps it
+_CARD_EDGE = 512  # pixels, longer edge of a card
+
+# Views of the six sides of the box: directions (x, y, z) that point right, up and to the viewer in
+# an upright image. The number of counterclockwise quarter turns fits the image to USD's card.
 _SIDES = {
     "XPos": ((0, 0, -1), (0, 1, 0), (1, 0, 0), 3),
     "XNeg": ((0, 0, 1), (0, 1, 0), (-1, 0, 0), 1),
@@ -41,9 +42,10 @@ _SIDES = {
 
 
 def write_previews(stage_dir: Path, as_written: AsWritten) -> bool:
-    """Draw the previews of a stage and name them in stage.usda; return whether there are any.
+    """Draw the previews of a stage, and refer to them in stage.usda.
 
-    A specimen without surfaces has none. Raises OutputError where a file can't be written.
+    Returns whether there are previews: a specimen without surfaces has none. Raises OutputError if
+    a file can't be written.
     """
     path = stage_dir / STAGE_NAME
     stage = open_stage(path)

@@ -1,23 +1,23 @@
-"""Write the stage of a specimen: stage.usda, which only names it, its contents and its looks.
+"""Write the stage of a specimen: stage.usda, and the layers that it refers to.
 
-stage.usda                    /Specimen, a reference to contents.usda
-contents.usda                 tiles by payload, cameras; sublayers the two looks/ layers
+stage.usda                    /Specimen, with a reference to contents.usda
+contents.usda                 tiles as payloads, and cameras; both looks/ layers are its sublayers
 looks/channels.usda           /Specimen/Channels, see usd/write_appearances.py
-looks/lights.usda             a copy of usd_assets/lights.usda, and beside it the image of its dome
+looks/lights.usda             a copy of usd_assets/lights.usda, with the image of its dome
 tiles/<tile>/tile.usdc        see usd/write_tile.py
 
 specimen.usdz                 see usd/write_usdz.py
-display.usda                  the stage, larger: see usd/write_display.py
+display.usda                  the stage, enlarged: see usd/write_display.py
 nvindex.usda                  the stage for NVIDIA IndeX: see usd/write_nvindex.py
 
-USD's order of strength puts a layer's own opinions before inherits, these before variants, and
-variants before references. All that a build states comes by a reference, so it is weaker than
-whatever is layered over the stage: a class that a channel inherits, or a variant set on /Specimen
-or a prim above. /Specimen inherits /__class__/Specimen, which is empty: opinions about that class
-in a scene reach each specimen that the scene references.
+In USD, a layer's own opinions are stronger than inherits, inherits are stronger than variants, and
+variants are stronger than references. All content of a build comes by a reference. So any opinion
+in a layer over the stage is stronger, even in a class that a channel inherits, or in a variant of
+/Specimen or of a prim above. The prim /Specimen inherits the empty class /__class__/Specimen. If a
+scene edits this class, it edits every specimen that the scene references.
 
-Of the content of tiles, contents.usda states only the selected variants: they are known while a
-tile is unloaded.
+contents.usda repeats the variants that each tile selects, so that they are known before the tile is
+loaded.
 """
 
 import hashlib
@@ -67,7 +67,7 @@ from stereocell.usd.written_files import CONTENTS_NAME, DISPLAY_NAME, STAGE_NAME
 
 __all__ = ["LAYER_SUFFIXES", "SUBLAYERS", "TileExtent", "is_layer", "write_stage", "write_tile"]
 
-# The sublayers of contents.usda, the strongest first
+# Sublayers of contents.usda, strongest first
 SUBLAYERS = ("./looks/channels.usda", "./looks/lights.usda")
 _NOTE = """Edit in a layer of your own that has this one as a sublayer; a new build writes these
 files anew. All content comes from contents.usda by a reference, so any opinion in your layers is
@@ -78,7 +78,7 @@ data. Edit in a layer over stage.usda: one over this layer is not known to `ster
 
 @dataclass(frozen=True, slots=True)
 class TileExtent:
-    """A tile's place, as in TileContent. All (z, y, x) in um."""
+    """The place of a tile; see TileContent. Lengths are (z, y, x) in um."""
 
     id: str
     first_um: Point
@@ -92,7 +92,7 @@ class TileExtent:
 
     @property
     def drawn_box(self) -> NDArray[np.float64]:
-        """Lower and upper corner (x, y, z), um, of the drawn tile, half a voxel wider; (2, 3)."""
+        """The drawn tile's corners (2, 3), (x, y, z) in um: half a voxel outside the centres."""
         half = np.asarray(self.spacing_um) / 2
         return np.array(world_box(self.first_um - half, self.last_um + half))
 
@@ -112,24 +112,23 @@ def write_stage(
 ) -> str:
     """Write the stage over tiles that `write_tile` has written.
 
-    Returns a line about the specimen's physical size.
+    Returns a sentence about the specimen's physical size.
 
-    A tile that is written later has its default variants, and no selection in contents.usda.
+    A tile that is written later shows its default variants; contents.usda does not select any.
 
-    name        the specimen's; becomes the display name of /Specimen
-    provenance  settings and versions; stored in the customLayerData of stage.usda: numbers, texts
-                and dictionaries as they are, other values as JSON text
-    modality    DICOM's code of the modality (`MR`, `CT`, ...), on /Specimen; empty: not known
-    placement   rows of a (4, 4) matrix for columns, um: a transform on /Specimen/Tiles; the
-                identity is not written
-    has_sides   whether the placed specimen lies as read/anatomical_axes.py has it: then the group
-                of the tiles says where left, posterior and superior are
-    opens_cut   whether a plane through the specimen's middle opens it to the first view, which is
-                from the right of the front; of a patient it lies between left and right
+    name        name of the specimen, which becomes the display name of /Specimen
+    provenance  settings and versions, for the customLayerData of stage.usda; numbers, texts and
+                dictionaries are stored as they are, other values as JSON
+    modality    DICOM's code of the modality (`MR`, `CT`, ...); empty: not known
+    placement   rows of a (4, 4) matrix for column vectors, um: the transform of /Specimen/Tiles;
+                the identity is not written
+    has_sides   whether the placed specimen is aligned with the patient as in
+                read/anatomical_axes.py; then the tiles' group states the patient's sides
+    opens_cut   whether the specimen opens with a clip plane through its middle, perpendicular to x;
+                in a patient, the plane separates left and right
+    tables      object tables of label maps, by channel ID
 
-    tables      of the objects of label maps, by the ID of their channel
-
-    Raises OutputError where a file can't be written.
+    Raises OutputError if a file can't be written.
     """
     with replacing_folder(stage_dir / "looks") as folder:
         write_appearances(folder, appearances, tables or {})
@@ -145,7 +144,7 @@ def write_stage(
     Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
     group = UsdGeom.Xform.Define(stage, TILES)
     Usd.ModelAPI(group.GetPrim()).SetKind(Kind.Tokens.group)
-    move = np.array(placement).T  # USD's matrices are for row vectors
+    move = np.array(placement).T  # USD uses row vectors
     if placement != IDENTITY:
         group.AddTransformOp().Set(Gf.Matrix4d(*move.ravel().tolist()))
     if has_sides:
@@ -161,7 +160,8 @@ def write_stage(
             selections, extents = _read_layer(file, surfaces)
         for variant_set, variant in selections:
             prim.GetVariantSets().GetVariantSet(variant_set).SetVariantSelection(variant)
-        # the box of an unloaded tile; an offset moves surfaces beyond the tile's own box
+        # The hint tells programs the box of an unloaded tile. It also contains surfaces that an
+        # offset moved out of the tile's own box.
         box[:] = box_around(np.array([tile.drawn_box, *extents]))
         UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(box))
     moved = np.array([move_box(low, high, move) for low, high in boxes])
@@ -183,7 +183,7 @@ def write_stage(
 
     layer = stage.GetRootLayer()
     layer.documentation = _CONTENTS_NOTE
-    del stage  # the sublayers' paths only resolve beside the file
+    del stage  # the sublayers would not resolve for a layer in memory
     layer.subLayerPaths = list(SUBLAYERS)
     export(layer, stage_dir / CONTENTS_NAME)
     version = _write_interface(stage_dir, name, provenance)
@@ -192,7 +192,7 @@ def write_stage(
 
 
 def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> str:
-    """Write stage.usda: the specimen's root, which has all its content by a reference.
+    """Write stage.usda: the specimen's root prim with a reference to all content.
 
     Returns the version of the asset.
     """
@@ -205,14 +205,14 @@ def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> str:
     model = Usd.ModelAPI(root)
     model.SetAssetName(name)
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{STAGE_NAME}"))
-    # The version follows from all that the build depends on.
+    # The version is a hash of everything that the build depends on.
     text = json.dumps(plain, sort_keys=True)
     version = hashlib.sha256(text.encode()).hexdigest()[:12]
     model.SetAssetVersion(version)
     layer = stage.GetRootLayer()
     layer.documentation = _NOTE
     layer.customLayerData = {"stereocell": plain}
-    del stage  # the reference only resolves beside the file
+    del stage  # the reference would not resolve for a layer in memory
     reference = layer.GetPrimAtPath(ROOT).referenceList
     reference.prependedItems.append(Sdf.Reference(f"./{CONTENTS_NAME}"))
     export(layer, stage_dir / STAGE_NAME)
@@ -220,7 +220,7 @@ def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> str:
 
 
 def _state_cut(root: Usd.Prim, boxes: NDArray[np.float64]) -> None:
-    """State the plane that the specimen opens cut by: what lies beyond its middle along x is gone.
+    """Write the clip plane at opening: it cuts away the half of the specimen with larger x.
 
     boxes  (tiles, 2, 3), lower and upper corners (x, y, z), um, world
     """
@@ -229,9 +229,10 @@ def _state_cut(root: Usd.Prim, boxes: NDArray[np.float64]) -> None:
 
 
 def _state_sides(group: Usd.Prim, move: NDArray[np.float64]) -> None:
-    """State the patient's sides among the group's own axes, so that they turn with it.
+    """Write the directions to the patient's sides in the group's own axes, so they turn with it.
 
-    move  (4, 4) for row vectors: from the group's axes to the patient's world, (L, S, -P)
+    move  (4, 4) for row vectors, from the group's axes to the patient's world: x is left, y is
+          superior, z is anterior
     """
     group.AddAppliedSchema(PATIENT_API)
     for side, name in SIDES.items():
@@ -245,7 +246,10 @@ def _box_shown(
     move: NDArray[np.float64],
     whole: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the box (2, 3), world um, of the shown channels: a volume may fill the whole."""
+    """Return the box (2, 3), world um, around the surfaces of the channels that show at opening.
+
+    It is the whole box if one of these channels has no surface, since a volume may fill it.
+    """
     opening = [one.id for one in appearances if one.opens]
     if not opening or any(id_ not in surfaces for id_ in opening):
         return whole
@@ -256,10 +260,10 @@ def _box_shown(
 def _read_layer(
     file: Path, surfaces: dict[str, list[NDArray[np.float64]]]
 ) -> tuple[list[tuple[str, str]], list[NDArray[np.float64]]]:
-    """Return the variants that a tile's own layer selects, (variant set, variant), and all extents.
+    """Return the selections (variant set, variant) of a tile's layer, and the extents of its prims.
 
-    The extents (2, 3), um, cover all its prims, for any selection. Those of meshes are added to
-    `surfaces`, by channel.
+    Extents are (2, 3), um, and those of all variants are included. The extents of meshes are also
+    added to `surfaces`, by channel.
     """
     if not file.is_file():
         return [], []
@@ -270,7 +274,7 @@ def _read_layer(
         if path.name != "extent":
             return
         extents.append(np.array(layer.GetAttributeAtPath(path).default, np.float64))
-        place = path.GetPrimPath().StripAllVariantSelections()  # the type stands outside variants
+        place = path.GetPrimPath().StripAllVariantSelections()  # variants do not state the type
         if layer.GetPrimAtPath(place).typeName == "Mesh":
             surfaces.setdefault(place.GetParentPath().name, []).append(extents[-1])
 

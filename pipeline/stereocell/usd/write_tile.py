@@ -1,19 +1,19 @@
-"""Write one tile of a stage: tile.usdc, and beside it its volumes and baked maps.
+"""Write one tile of a stage: tile.usdc with its volumes and baked maps.
 
-A tile's materials inherit the prim /Specimen/Channels/<channel>, which lies outside this file. USD
-resolves such an inherit in the stage that holds the payload. So that one prim sets the look of all
-tiles, and an opinion about it in any layer over the stage reaches them all. What the tile itself
-states about the colour is weaker: it shows where the tile is opened by itself.
+A tile's materials inherit the prim /Specimen/Channels/<channel>, which is not in this file. USD
+finds it in the stage that loads the tile as a payload. So this one prim sets the appearance of all
+tiles, and an edit of it in any layer over the stage changes all of them. The tile also states the
+colour itself. That opinion is weaker and counts only if the tile is opened alone.
 
-Baked maps belong to the tile: normals, occlusion and sampled channel of each level feed the shader
-inside the level's variant. The channel's opinion would be the stronger one, so a channel with a
-sampled channel has no opinion about diffuseColor.
+Baked maps belong to the tile. The maps of each level (normals, occlusion, intensity of the sampled
+channel) feed the shader inside the level's variant. An opinion of the channel's material would be
+stronger, so a channel that shows a sampled channel has no opinion about diffuseColor.
 
-In the same way a channel's surface and volume inherit the visibility of /Specimen/Shown/<channel>.
+In the same way, a channel's surface and volume inherit the visibility of /Specimen/Shown/<channel>.
 
-`lod1` is the default: an artist arranges and lights all tiles at once, for which the finest level
-is millions of triangles too heavy, and selects `lod0` for the final frame. So neither of the two
-requests less detail on the phone, but a coarser level does (usd/read_variants.py).
+`lod1` is the default. Artists arrange and light all tiles at once, and all finest levels together
+would have millions of triangles too many. They select `lod0` for the final frame. Neither of the
+two limits the detail of the bundle, but a coarser level does (usd/read_variants.py).
 """
 
 import shutil
@@ -57,23 +57,23 @@ from stereocell.usd.preview_surface import define_surface, repeat_color
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_primvar, feed_vertices
 from stereocell.usd.write_objects import define_objects, write_objects
 
-DEFAULT_LOD = 1  # level of detail that a stage selects
+DEFAULT_LOD = 1  # level of detail that a stage selects by default
 LAYER_NAME = "tile.usdc"
 
-_STEPS = np.arange(256, dtype=np.uint8)  # what baked values at vertices may be
+_STEPS = np.arange(256, dtype=np.uint8)  # possible values of bytes that are baked at vertices
 
 _Types = Sdf.ValueTypeNames
 
 
 def write_tile(stage_dir: Path, tile: TileContent, *, has_vdb: bool = True) -> tuple[FileList, int]:
-    """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one.
+    """Write the folder `stage_dir`/tiles/<tile>/, and replace an older one.
 
-    has_vdb  whether volumes have fields of OpenVDB, which other programs draw
+    has_vdb  whether volumes get OpenVDB fields, which other programs draw
 
-    Returns its files, and the bytes of its voxels as measured.
+    Returns the list of its files, and the size in bytes of the voxels as measured.
 
-    Tiles are independent. Raises OutputError where a file can't be written, ValueError (a bug)
-    where a volume's shape doesn't fit its tile.
+    Tiles do not depend on each other. Raises OutputError if a file can't be written, and ValueError
+    (a bug) if the shape of a volume does not fit its tile.
     """
     for channel in tile.channels:
         _check_shape(tile, channel)
@@ -82,20 +82,20 @@ def write_tile(stage_dir: Path, tile: TileContent, *, has_vdb: bool = True) -> t
             _write_files(folder, tile, channel, has_vdb)
         export(_compose(tile, has_vdb), folder / LAYER_NAME)
         files = {file.name: measure(file) for file in sorted(folder.iterdir())}
-        # here, since a stored folder's large files leave this machine
+        # The sizes are read here, since storing the folder may remove large files from this disk.
         grids = [grid for file in folder.glob("*.vdb") for grid in read_vdb_head(file)]
         return files, sum(grid.end - grid.start for grid in grids if grid.name == MEASURED_NAME)
 
 
 def closed_file(stage_dir: Path, tile_id: str, channel_id: str) -> Path:
-    """Return the path of the closed copy of one channel, as `write_tile` writes it."""
+    """Return the path of the closed copy of a channel's surface, which `write_tile` writes."""
     return stage_dir / "tiles" / tile_id / _closed_name(channel_id)
 
 
 def has_mesh(stage_dir: Path, tile_id: str, channel_id: str) -> bool:
     """Return whether a channel has a surface in a tile.
 
-    Raises StageError where the tile's layer is missing or damaged.
+    Raises StageError if the tile's layer is missing or damaged.
     """
     path = stage_dir / "tiles" / tile_id / LAYER_NAME
     layer = Sdf.Layer.FindOrOpen(str(path)) if path.is_file() else None
@@ -179,7 +179,7 @@ def _map_name(channel: ChannelContent, level: int, kind: Kind) -> str:
 
 
 def _leaf(tile: TileContent, channel: ChannelContent, suffix: str = "") -> str:
-    """Return a name that is unique in the whole stage: some clients flatten the tree."""
+    """Return a prim name that is unique in the stage, for programs that flatten the tree."""
     return f"{channel.channel_id}_{tile.id}{suffix}"
 
 
@@ -197,12 +197,12 @@ def _bind(gprim: UsdGeom.Gprim, branch: UsdGeom.Xform, look: str) -> None:
 
 
 def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent) -> None:
-    """Define the properties that all levels of detail share."""
+    """Define the mesh with the properties that all levels of detail share."""
     stage = branch.GetPrim().GetStage()
     mesh = UsdGeom.Mesh.Define(stage, branch.GetPath().AppendChild(_leaf(tile, channel)))
     mesh.GetPrim().AddAppliedSchema(SURFACE_API)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)  # the tile's end cuts the surface open
+    mesh.CreateDoubleSidedAttr(True)  # the surface is open at the faces of its tile
     _bind(mesh, branch, _leaf(tile, channel, "_look"))
     if channel.objects is not None:
         look = branch.GetPath().AppendChild(_leaf(tile, channel, "_look"))
@@ -213,7 +213,7 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
 def _define_volume(
     branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent, voxels: NDArray[np.uint8]
 ) -> UsdVol.Volume:
-    """Define the volume, and the atlas of its voxels that the bundle reads."""
+    """Define the volume, and refer to the file with its voxels that the bundle reads."""
     stage = branch.GetPrim().GetStage()
     path = branch.GetPath().AppendChild(_leaf(tile, channel, "_volume"))
     volume = UsdVol.Volume.Define(stage, path)
@@ -237,10 +237,10 @@ def _define_volume(
 
 
 def _define_fields(volume: UsdVol.Volume, channel: ChannelContent) -> None:
-    """Define a volume's fields, nested below, of one file: clients read one per volume.
+    """Define a volume's fields as its children, all in one file: programs read one per volume.
 
-    What lies around the tile is in `measured` too: a new window is applied to that, and the
-    bundle's volumes have an apron.
+    The field `measured` includes the apron. The bundle applies an edited window to it, and the
+    bundle's volumes need the apron.
     """
     stage, path = volume.GetPrim().GetStage(), volume.GetPath()
     tokens = UsdVol.Tokens
@@ -257,7 +257,7 @@ def _define_fields(volume: UsdVol.Volume, channel: ChannelContent) -> None:
 
 
 def _author_lods(root: Usd.Prim, tile: TileContent) -> None:
-    """Put each level's geometry into its variant; a channel with fewer levels repeats its last."""
+    """Write each level's geometry into a variant. A channel with fewer levels repeats its last."""
     count = max((len(channel.lods) for channel in tile.channels), default=0)
     if count == 0:
         return
@@ -300,9 +300,9 @@ def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, leve
 
 
 def _author_uvs(mesh: UsdGeom.Mesh, made: Mesh) -> None:
-    """Write UVs and tangents by face corner: charts end at seams, and points must not.
+    """Write UVs and tangents by face corner, so that points need not be split at seams of charts.
 
-    Both have a value for each vertex of the split mesh, and indices by corner.
+    Both have one value for each vertex of `made`, whose seams are split, and an index per corner.
     """
     primvars, corner = UsdGeom.PrimvarsAPI(mesh), UsdGeom.Tokens.faceVarying
     indices = Vt.IntArray.FromNumpy(made.triangles.astype(np.int32).ravel())
@@ -317,7 +317,7 @@ def _author_uvs(mesh: UsdGeom.Mesh, made: Mesh) -> None:
 
 
 def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, level: int) -> None:
-    """Feed the baked maps to the surface shader that the look inherits."""
+    """Connect a level's baked maps, or its baked values at vertices, to the surface shader."""
     lod, stage = channel.lods[level], mesh.GetPrim().GetStage()
     has_maps = lod.normal_map is not None
     if has_maps and lod.mesh.uvs is None:
@@ -340,7 +340,7 @@ def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, le
         return
     if has_maps:
         feed_image(stage, look, "color", f"./{_map_name(channel, level, 'color')}")
-        # for clients that draw without materials
+        # The average colour, for programs that draw without materials.
         average = channel.paint.mix(baked.paint).reshape(-1, 3).mean(axis=0)
         UsdGeom.Gprim(mesh).CreateDisplayColorAttr([Gf.Vec3f(*map(float, average))])
     else:
@@ -354,9 +354,10 @@ def _feed_steps(
     table: NDArray[np.float32],
     at_vertices: NDArray[np.uint8],
 ) -> None:
-    """Feed baked bytes at vertices to a surface, by a table of the values that occur.
+    """Connect baked bytes at vertices to the surface shader, as indices into a short table.
 
-    table  (256,) or (256, 3), the value of each byte
+    table        (256,) or (256, 3), the value that each byte stands for; only used ones are stored
+    at_vertices  (n,), the byte of each vertex
     """
     used, indices = np.unique(at_vertices, return_inverse=True)
     feed_vertices(mesh, look, kind, table[used], indices.reshape(-1).astype(np.int32))
@@ -370,7 +371,7 @@ def _author_representations(root: Usd.Prim, tile: TileContent) -> None:
         with variants.GetVariantEditContext():
             for channel in tile.channels:
                 if channel.volume is None or name == "both":
-                    continue  # a surface without a volume of its own stays
+                    continue  # a channel without a volume shows its surface in every variant
                 if name == "mesh" or channel.lods:
                     suffix = "_volume" if name == "mesh" else ""
                     branch = root.GetPath().AppendChild(channel.channel_id)

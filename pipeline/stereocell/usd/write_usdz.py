@@ -1,16 +1,18 @@
 """Write specimen.usdz: the meshes of a composed stage as one small file for AR viewers.
 
-AR viewers expect metres, a scene that stands on the floor, and a few hundred thousand triangles. So
-the specimen is scaled to the size of a hand (its longest edge is SIZE_M long) unless a scale is
-given. It stands with its lowest point at y = 0 and its middle above the origin, and has the finest
-level of detail of at most MAX_TRIANGLES triangles (the coarsest, if none is that small). The
-layer's customLayerData states `stereocell:scale`, metres in the file for one metre of the specimen,
-and `size`. It has the channels that the stage shows, if any of them is drawn.
+AR viewers expect metres, a scene that stands on the floor, and a few hundred thousand triangles:
 
-Meshes and curves that layers add come along, unless only some tiles are written. Volumes are left
-out: usdz allows no .vdb. The archive holds one .usdc without variants or payloads,
-which comes first, the baked maps of that level, and the stage's lights with the image of the dome.
-The same stage gives the same bytes.
+- The specimen is scaled to the size of a hand (longest edge: SIZE_M) unless a scale is given.
+- Its lowest point is at y = 0, and its middle is above the origin.
+- It has the finest level of detail with at most MAX_TRIANGLES triangles, or else the coarsest.
+- It has the channels that are visible at opening. If none of them is drawn, it has all channels.
+
+In the layer's customLayerData, `stereocell:scale` is the length in the file divided by the length
+of the specimen, and `stereocell:size` is the longest edge in metres.
+
+Meshes and curves that layers add are included, unless only some tiles are written. Volumes are left
+out, since usdz does not allow .vdb. The archive starts with one .usdc without variants or payloads.
+The baked maps of the level follow, and the lights' images. The same stage gives the same bytes.
 
 References: OpenUSD, Usdz File Format Specification, https://openusd.org/release/spec_usdz.html
 """
@@ -42,18 +44,19 @@ from stereocell.usd.usdz_lights import copy_lights
 from stereocell.usd.written_files import AsWritten
 
 USDZ_NAME = "specimen.usdz"
-SIZE_M = 0.15  # m, the specimen's longest edge
-MAX_TRIANGLES = 200_000  # most triangles of all meshes together
+SIZE_M = 0.15  # m, longest edge of the specimen
+MAX_TRIANGLES = 200_000  # largest number of triangles of all meshes together
 
 _LAYER = "specimen.usdc"
-# zip: bytes of a local header without its name, of an extra field's header; its ID for padding
+# Format zip: size in bytes of a local header without the name, and of the header of an extra field;
+# ID of the extra field that holds the padding
 _HEAD_BYTES, _EXTRA_BYTES, _PADDING_ID = 30, 4, 0x1986
 _Types = Sdf.ValueTypeNames
 
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """One mesh: a channel in a tile."""
+    """The mesh of one channel in one tile."""
 
     tile: str
     channel: str
@@ -73,13 +76,14 @@ def write_usdz(
     """Write the meshes of a stage, or of a layer over it, as `path`; return the level of detail.
 
     as_written  the lists to compare the stage's files with; None: no comparison
-    level       of detail; None: the finest that is light enough
-    tiles       IDs of those that are written; empty: all
-    channels    the same; empty: those that show at first, if any is drawn, else all
-    scale       lengths in the file for a length of the specimen; None: the longest edge is SIZE_M
+    level       level of detail; None: the finest with at most MAX_TRIANGLES triangles
+    tiles       IDs of the tiles to write; empty: all tiles
+    channels    IDs of the channels to write; empty: those that are visible at opening, or all
+                channels if none of those is drawn
+    scale       length in the file / length of the specimen; None: the longest edge is SIZE_M
 
-    Returns None where no mesh is drawn; then no file is left at `path`. Raises StageError where
-    the stage can't be read, OutputError where the file can't be written.
+    Returns None if no mesh is drawn, and deletes an older file at `path`. Raises StageError if the
+    stage can't be read, and OutputError if the file can't be written.
     """
     as_written = as_written or AsWritten({stage_path.parent: {}})
     stage = open_stage(stage_path)
@@ -116,7 +120,7 @@ def find_parts(
     level: int | None = None,
     channels: Collection[str] = (),
 ) -> tuple[list[_Part], int | None]:
-    """Return the meshes of some tiles, `prims`, and their level of detail; see `write_usdz`."""
+    """Return the meshes of the tiles `prims`, and their level of detail; see `write_usdz`."""
     found: list[_Part] = []
     shown = level
     for some in [channels] if channels else _choices(stage):
@@ -127,7 +131,7 @@ def find_parts(
 
 
 def _choices(stage: Usd.Stage) -> list[list[str]]:
-    """Return the IDs of the channels to show: the first choice of which any is drawn."""
+    """Return lists of channel IDs to try: those that show at opening, then all channels."""
     every = stage.GetPrimAtPath(specimen_of(stage).channels).GetChildren()
     names = [str(prim.GetName()) for prim in every]
     shown = [name for name, prim in zip(names, every, strict=True) if shows_at_first(prim)]
@@ -135,7 +139,7 @@ def _choices(stage: Usd.Stage) -> list[list[str]]:
 
 
 def _choose_level(stage: Usd.Stage, channels: Collection[str], as_written: AsWritten) -> int | None:
-    """Return the finest level within MAX_TRIANGLES, else the coarsest; None: there is no mesh."""
+    """Return the finest level within MAX_TRIANGLES, or else the coarsest; None: no mesh."""
     counts: list[list[int]] = []
     for name in [str(prim.GetName()) for prim in tile_prims(stage)]:
         with loaded(stage, name, as_written=as_written) as (tile, _):
@@ -158,7 +162,7 @@ def _count_triangles(tile: Usd.Prim, channels: Collection[str], level: int) -> i
 def _read_parts(
     stage: Usd.Stage, prims: list[Usd.Prim], channels: Collection[str], level: int
 ) -> Iterator[_Part]:
-    """Yield every drawn mesh with triangles at a level, or at its coarsest where it has fewer."""
+    """Yield each drawn mesh that has triangles, at a level or else the next finer one it has."""
     for name in [str(prim.GetName()) for prim in prims]:
         with loaded(stage, name) as (tile, _):
             for channel in channels:
@@ -195,10 +199,11 @@ def _define_parts(
 ) -> None:
     """Define the meshes, tile by tile.
 
-    foot   the point (x, y, z) that comes to the origin, world um
-    scale  metres in the file for a um
+    foot   point (x, y, z) that moves to the origin, world um
+    scale  metres in the file per um
 
-    A channel's meshes share one material, except those with a normal map or a look of their own.
+    The meshes of a channel share one material. A mesh gets its own material if it has maps, values
+    at vertices, or other material values than the first mesh of its channel.
     """
     looks = UsdGeom.Scope.Define(stage, ROOT.AppendChild("Looks")).GetPath()
     usual: dict[str, Material] = {}
@@ -218,7 +223,7 @@ def _define_parts(
 def _define_additions(
     stage: Usd.Stage, additions: list[Addition], foot: NDArray[np.float64], scale: float
 ) -> None:
-    """Define the meshes that layers add, each with a material of its own."""
+    """Define the meshes that layers add, each with its own material."""
     for number, addition in enumerate(additions):
         name = f"addition{number}"
         mesh = UsdGeom.Mesh.Define(stage, ROOT.AppendPath(f"Annotations/{name}"))
@@ -234,7 +239,7 @@ def _define_additions(
 def _fill_mesh(mesh: UsdGeom.Mesh, shape: Mesh, positions: NDArray[np.float64]) -> None:
     points, triangles = vec3f(positions), shape.triangles.astype(np.int32)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)  # the tile's end cuts the surface open
+    mesh.CreateDoubleSidedAttr(True)  # the surface is open at the faces of its tile
     mesh.CreatePointsAttr(points)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))
@@ -262,7 +267,7 @@ def _define_look(
 
 
 def _define_surface(stage: Usd.Stage, path: Sdf.Path, given: Material) -> UsdShade.Material:
-    """Define a material of plain values."""
+    """Define a material with plain values only."""
     material = UsdShade.Material.Define(stage, path)
     surface = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
     surface.CreateIdAttr("UsdPreviewSurface")
@@ -279,7 +284,7 @@ def _define_surface(stage: Usd.Stage, path: Sdf.Path, given: Material) -> UsdSha
 
 
 def _images(part: _Part) -> dict[Kind, Path]:
-    """Return the image files of a mesh."""
+    """Return the image files of a mesh's maps, by kind."""
     maps = part.lod.maps
     named: dict[Kind, Path | None] = {
         "normal": maps.normal,
@@ -294,9 +299,9 @@ def _texture_name(part: _Part, kind: Kind) -> str:
 
 
 def _pack(layer: Sdf.Layer, images: Mapping[str, bytes], path: Path) -> None:
-    """Put the layer and its images, by their names, into an archive, the layer first.
+    """Write an archive with the layer first, and then the images by name.
 
-    Raises OutputError where it can't be written.
+    Raises OutputError if it can't be written.
     """
     with tempfile.TemporaryDirectory() as folder:
         export(layer, Path(folder) / _LAYER)
@@ -307,10 +312,10 @@ def _pack(layer: Sdf.Layer, images: Mapping[str, bytes], path: Path) -> None:
 
 
 def _entry(name: str, offset: int) -> zipfile.ZipInfo:
-    """Return the header of an uncompressed file in the archive, padded so that its bytes start at
-    a multiple of 64, as the specification of usdz requires.
+    """Return the header of an uncompressed file that is added to an archive at an offset.
 
-    USD's own writer dates the files by the clock, so that its archives differ in each run.
+    The header is padded so that the file's bytes start at a multiple of 64, as usdz requires. USD's
+    own writer stores the current time, so its archives would differ in each run.
     """
     info = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
     padding = -(offset + _HEAD_BYTES + len(name.encode()) + _EXTRA_BYTES) % 64

@@ -1,10 +1,12 @@
-"""files.json of a stage lists the files that the build wrote, to detect damage and edits.
+"""Compare the files of a stage with files.json, which lists the files that the build wrote.
 
-A layer that differs from the list but can be opened may have been edited in place (although edits
-belong in an artist's own layers), or be damaged; messages name both. It is never rebuilt
-automatically, and it is used, except for a binary layer of unchanged size. USD opens most layers
-with a flipped bit (34 of 40 tried gave a bundle), and a saved edit seldom has the same length to
-the byte. Any other file that differs is damaged. Files outside the list are an artist's own.
+A layer that differs from the list was either edited in place or damaged, and messages name both.
+Edits belong in an artist's own layers, but some artists edit in place. If USD can open the layer,
+it is used, and never replaced automatically. A binary layer of unchanged size is an exception: it
+is not used, since a saved edit rarely has exactly the same size. USD can't find all damage: it
+opens most layers with a flipped bit (34 of 40 trials gave a bundle).
+
+Any other file that differs is damaged. Files that are not in the list belong to an artist.
 """
 
 import hashlib
@@ -38,17 +40,17 @@ ADVICE = "edits belong in a layer of your own over the stage"
 
 
 def write_list(stage_dir: Path, tiles: FileList, *others: Path) -> None:
-    """Write files.json: the given entries of `tiles`, and new ones of all files at `others`."""
+    """Write files.json: the given entries of `tiles`, and new entries for the files at `others`."""
     listed = {**tiles, **list_files(*others, root=stage_dir)}
     write_bytes(stage_dir / FILES, encode(listed))
 
 
 def read_stage_list(stage_dir: Path) -> dict[str, Any]:
-    """Return the content of files.json. Raises OutputError where it is missing or damaged."""
+    """Return the content of files.json. Raises OutputError if it is missing or damaged."""
     return read_list(stage_dir / FILES, REMEDY)
 
 
-# This table says what the files of a stage hold, by suffix. Tiles have no other .usdc.
+# Content of a stage's files, by suffix. The only .usdc files are those of tiles.
 _PARTS = {
     ".vdb": "volumes for other programs",
     ".exr": "volumes for the bundle, and looks",
@@ -60,7 +62,7 @@ _PARTS = {
 
 
 def describe_parts(listed: FileList) -> str:
-    """Return a line on how large a stage is, and each of its parts, the largest first."""
+    """Return a sentence on the size of a stage and of its parts, largest first."""
     sizes = dict.fromkeys((*_PARTS, ""), 0)
     for path, entry in listed.items():
         suffix = Path(path).suffix
@@ -75,13 +77,15 @@ def describe_parts(listed: FileList) -> str:
 
 
 def digest_of(listed: FileList) -> str:
-    """Return a digest of a list."""
+    """Return a hash of a list of files, 20 hexadecimal digits."""
     return hashlib.sha256(encode(listed)).hexdigest()[:20]
 
 
 def find_damage(root: Path, listed: FileList, *, since: Path | None = None) -> dict[str, str]:
-    """Return the fault of each file of a list that has one, by path: as `file_list.find_faults`, or
-    CHANGED or DOUBTFUL for a layer."""
+    """Return the fault of each faulty file of a list, by path.
+
+    Faults are those of `file_list.find_faults`, and CHANGED or DOUBTFUL for layers.
+    """
     faults = find_faults(root, listed, since=since)
     return {
         path: _name_fault(root / path, listed[path]) if fault == DAMAGED else fault
@@ -101,14 +105,14 @@ def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
 
 
 def require_kept(root: Path, listed: FileList, since: Path) -> None:
-    """Raise StageError where a file of a list is missing or damaged, or a layer most likely is."""
+    """Raise StageError if a file of a list is missing or damaged, or a layer probably is."""
     for path, fault in find_damage(root, listed, since=since).items():
         if fault != CHANGED:
             raise _error_of(root / path, fault)
 
 
 def is_kept(root: Path, listed: FileList, since: Path) -> bool:
-    """Return whether every file of a list is unchanged or a layer that may have been edited."""
+    """Return whether each file of a list is unchanged, or is a layer that may have been edited."""
     return set(find_damage(root, listed, since=since).values()) <= {CHANGED, DOUBTFUL}
 
 
@@ -116,15 +120,15 @@ def is_kept(root: Path, listed: FileList, since: Path) -> bool:
 class AsWritten:
     """Compares files with the lists of their stages before they are read.
 
-    lists    of each stage by its folder; other lists are read there on first use
-    changed  layers that differ from their list and were accepted
+    lists    list of files for each stage, by its folder; missing lists are read when needed
+    changed  layers that differ from their list and were accepted nevertheless
     """
 
     lists: dict[Path, FileList] = field(default_factory=dict)
     changed: set[Path] = field(default_factory=set)
 
     def require(self, file: Path) -> Path:
-        """Fetch a file and return it. Raises StageError where it is missing or damaged."""
+        """Fetch a file and return its path. Raises StageError if it is missing or damaged."""
         fetch(file)
         place = file.parent.resolve() / file.name
         folder, listed = self._list_over(place.parent)
@@ -134,7 +138,7 @@ class AsWritten:
         return file
 
     def require_layers(self, folder: Path) -> None:
-        """Raise StageError where a layer directly in a folder of a stage is missing or damaged."""
+        """Raise StageError if a listed layer directly in a folder is missing or damaged."""
         folder = folder.resolve()
         root, listed = self._list_over(folder)
         for path in listed:
@@ -143,10 +147,13 @@ class AsWritten:
                 self.require(file)
 
     def _list_over(self, folder: Path) -> tuple[Path, FileList]:
-        """Return the folder of the list that covers `folder`, and the list; or an empty one."""
+        """Return the list for a folder or the nearest folder above it, and that list's folder.
+
+        Without a list, returns the folder itself and an empty list.
+        """
         for parent in (folder, *folder.parents):
             if parent not in self.lists:
-                # a bundle has a files.json, too
+                # A files.json alone is not enough: bundles have one, too.
                 has_one = is_file(parent / FILES) and is_file(parent / STAGE_NAME)
                 self.lists[parent] = read_stage_list(parent) if has_one else {}
             if self.lists[parent]:
@@ -165,7 +172,7 @@ class AsWritten:
 
 
 def _error_of(file: Path, fault: str) -> StageError:
-    """Return the error of a file of the stage that can't be used."""
+    """Return the error for a stage's file that can't be used."""
     if fault == MISSING:
         return StageError(f"{file}: missing: {REMEDY}")
     if fault == DOUBTFUL:
