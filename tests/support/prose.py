@@ -22,8 +22,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-MAX_WORDS = 30  # of a sentence
-MAX_AVERAGE_WORDS = 18.0  # of the sentences of a page of docs
+MAX_WORDS = 30  # words in a sentence
+MAX_AVERAGE_WORDS = 18.0  # words in a sentence, averaged over a page of docs
 SHORTEST_MESSAGE = 4  # words; shorter strings of code are names and keys
 NO_SUBJECT = re.compile(
     r"(what|whatever|who|whoever|whose|whom|which|of|those|one more|none of|the same of)\b"
