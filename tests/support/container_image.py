@@ -89,7 +89,7 @@ class Image:
         return found
 
     def environment(self) -> dict[str, str]:
-        """The image's environment variables: only its own programs are found, and compilers fail."""
+        """The image's environment: only its own programs are found, and compilers fail."""
         ours = ("PYTHONPATH", "VIRTUAL_ENV", "PYTHONHOME", "NUMBA_CACHE_DIR", "PYTHONWARNINGS")
         inherited = {name: value for name, value in os.environ.items() if name not in ours}
         path = f"{self.venv / 'bin'}:{self.root / 'programs'}"

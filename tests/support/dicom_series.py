@@ -1,7 +1,7 @@
 """Synthetic DICOM series and NIfTI files of one scene whose every point in the patient is known.
 
 This module does not use stereocell. A grid is an affine (4, 4) that maps a column vector
-(slice, row, column, 1) to LPS in mm. In every grid, a voxel holds the value of `scene` at its place.
+(slice, row, column, 1) to LPS in mm. In every grid, a voxel has the value of `scene` at its place.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -29,7 +29,7 @@ from pydicom.uid import (
 
 Affine = NDArray[np.float64]
 Change = Callable[[pydicom.Dataset], None]
-# Bright bodies: centre in LPS mm, width (sigma) in mm, height. Every mirroring or turn changes them.
+# Bright bodies: centre in LPS mm, sigma in mm, height. Every mirroring or turn changes them.
 BODIES = (
     ((9.0, -13.0, 7.0), 5.0, 1000.0),  # in front, to the left, above the middle
     ((-12.0, 4.0, -10.0), 4.0, 500.0),

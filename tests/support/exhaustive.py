@@ -13,7 +13,7 @@ IS_EXHAUSTIVE = bool(os.environ.get("STEREOCELL_EXHAUSTIVE"))
 
 
 def sweep(cases: Iterable[Any], kept: Collection[Any]) -> list[Any]:
-    """Return the cases of a parametrization; cases that are not in `kept` are marked `exhaustive`."""
+    """Return the cases of a parametrization, with all except `kept` marked `exhaustive`."""
     found = list(cases)
     if missing := [case for case in kept if case not in found]:
         raise ValueError(f"kept of a sweep, but none of its cases: {missing}")

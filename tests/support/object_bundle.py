@@ -1,4 +1,4 @@
-"""A bundle of a label map in two tiles: closed cells and their table. The viewer's tests use it, too.
+"""A bundle of a label map in two tiles, for the viewer's tests, too: closed cells and their table.
 
 `python -m support.object_bundle FOLDER [--wide]` writes the bundle. Cells are balls on a grid. A
 cell's number on the grid is its row in the table, so a test knows where each cell is. The last

@@ -42,7 +42,7 @@ class Medium:
         return np.interp(self.intensity(p) * 255, np.arange(256), self.sigma)
 
     def gradient(self, p: Array) -> Array:
-        """Return differences of intensity over two voxels of the finest spacing, along each axis."""
+        """Return differences of intensity over two finest voxel spacings, along each axis."""
         parts = []
         for axis in range(3):
             step = np.zeros(3)
@@ -59,7 +59,7 @@ class Medium:
 
 
 def track(medium: Medium, p: Array, d: Array, limit: Array | None, rng) -> Array:
-    """Return the distance to the next collision; NaN if the ray leaves the box or passes `limit`."""
+    """Return the distance to the next collision; NaN if a ray leaves the box or passes `limit`."""
     near, far = medium.exit(p, d)
     if limit is not None:
         far = np.minimum(far, limit)

@@ -59,7 +59,7 @@ def draw_by_storm(file: Path, view: View, unit: float, picture: Path, width: int
 
 
 def draw_for_the_web(jobs: list[dict[str, object]], folder: Path) -> None:
-    """Draw files by three.js and Cesium; scripts/draw_models.ts of the viewer documents the jobs."""
+    """Draw files by three.js and Cesium; the viewer's scripts/draw_models.ts documents jobs."""
     listed = folder / "jobs.json"
     listed.write_text(json.dumps(jobs, default=str))
     command = ["npx", "tsx", "scripts/draw_models.ts", str(listed)]
