@@ -86,9 +86,8 @@ def chain(bundle, tile):
             if "children" not in entry:
                 break
             (entry,) = entry["children"]
-        assert (
-            entry["geometricError"] == 0
-        )  # 0 states that there is no finer level, so a reader stops
+        # 0 states that there is no finer level, so a reader stops.
+        assert entry["geometricError"] == 0
         found += [levels] * (folder == tile)
     (levels,) = found
     return levels

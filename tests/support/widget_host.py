@@ -35,9 +35,7 @@ def main() -> None:
     comm.create_comm = LineComm
     import stereocell
 
-    viewer = stereocell.show(
-        sys.argv[1], height=240
-    )  # pixels; small, because software draws the widget
+    viewer = stereocell.show(sys.argv[1], height=240)  # pixels; small, as software draws it
     for line in sys.stdin:
         told = json.loads(line)
         if "run" in told:
