@@ -2,7 +2,7 @@
  * Time every renderer in one headless Chromium, in rounds: node run.ts JOB OUT.
  *
  * JOB is a JSON file, see `Job`. A run's picture goes to OUT/NAME.rgba (bottom row first), its
- * times to OUT/timings.json. Each run has a page of its own that stays open; one page draws at a time.
+ * times to OUT/timings.json. Each run has a page of its own that stays open; one draws at a time.
  */
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
