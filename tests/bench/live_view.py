@@ -4,7 +4,7 @@
 
 The sources are those of `STEREOCELL_DATA`, and samples. For each source, `stereocell view` first
 starts once, so that the files are cached and Python has its bytecode. Then it starts ROUNDS times
-without a build. The table has the seconds from the start of the command to the page, and to the end
+without a build. The table has seconds from the start of the command to the page, and to the end
 of fetching the first view's files; the CPU seconds until then; and the bytes of these files and of
 the page. Then one file is requested again and again, alone and during the build. Other processes
 lengthen seconds more than CPU seconds, so the load of the machine is printed, too.

@@ -416,7 +416,7 @@ def test_coarse_lod_chosen_for_a_tile_is_the_finest_that_the_bundle_has(bundle, 
     assert chain(edited, "r0_c1") == ["lod2.glb"]
     assert [p.name for p in (edited / "channels/CD31/r0_c1").iterdir()] == ["lod2.glb"]
     kept = "channels/CD31/r0_c1/lod2.glb"
-    # A single level keeps its maps. Of several levels, the coarsest has none.
+    # A single level keeps its maps. The coarsest of several levels has none.
     assert "images" in read((edited / kept).read_bytes())[0]
     assert "images" not in read((bundle / kept).read_bytes())[0]
     assert not [path for path in load(edited / "files.json") if "r0_c1/lod0" in path]

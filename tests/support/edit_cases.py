@@ -25,7 +25,7 @@ _Types = Sdf.ValueTypeNames
 class EditCase:
     """One edit.
 
-    what    describes the edit in the table of the docs
+    what    description of the edit for the table of the docs
     change  makes the edit on a stage whose edit target is the artist's layer
     words   text of the line that refuses or reports the edit; for a taken edit, its effect
     is_partial  whether only a part of the edit is lost

@@ -20,7 +20,7 @@ _HOP = ("connection", "transfer-encoding", "keep-alive")
 
 @dataclass
 class Faults:
-    """Which requests fail, and how; `seen` counts requests by fault.
+    """Rules for failing requests; `seen` counts requests by fault.
 
     rate  share of requests that fail at random
     only  kinds of random faults

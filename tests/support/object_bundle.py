@@ -2,8 +2,8 @@
 
 `python -m support.object_bundle FOLDER [--wide]` writes the bundle. Cells are balls on a grid. A
 cell's number on the grid is its row in the table, so a test knows where each cell is. The last
-object is a box in both tiles, cut at their common plane. `--wide` gives the box a label that needs
-64 bits. `--painted` stains the upper half of each ball.
+object is a box in both tiles, cut at their common plane. With `--wide`, the box has a label that
+needs 64 bits. `--painted` stains the upper half of each ball.
 """
 
 import sys

@@ -52,8 +52,8 @@ WORDS = {  # words that readers stumble over, and what to write
 }
 STUMBLES = [(re.compile(rf"\b({old})\b", re.IGNORECASE), new) for old, new in WORDS.items()]
 ALLOWED: dict[str, str] = {}  # file: start of a sentence that may stay; at most ten
-# A sentence ends at a full stop, a blank line, a colon at the end of a line, before an item of a
-# list, and before the row of an argument such as "bins  number of bins"
+# A sentence ends at a full stop, at a blank line, or at a colon that ends a line. It also ends
+# before an item of a list, and before the row of an argument such as "bins  number of bins".
 ENDS = re.compile(
     r"(?<=[.!?])\s+(?=[A-Z`])|\n\s*\n|:\s*\n|\n(?=\s*([-*]|\d+\.) |\s*@|\s*[\w.`,*/= -]+? {2,}\w)"
 )

@@ -66,7 +66,7 @@ WITHOUT_FILES = (
     "model", "filters", "transfer", "isosurface", "objects", "meshes", "textures", "tissue",
     "kernels",
 )  # fmt: skip
-OF_COMPILING = {"cache_place.py", "compile_all.py"}  # they place and fill numba's cache
+OF_COMPILING = {"cache_place.py", "compile_all.py"}  # modules that place and fill numba's cache
 
 
 @pytest.mark.parametrize("package", WITHOUT_FILES)

@@ -71,8 +71,9 @@ def test_f_is_upright_and_not_mirrored_in_the_composed_stage(built: Path) -> Non
             matrix = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)
             points += [matrix.Transform(p) for p in UsdGeom.Mesh(prim).GetPointsAttr().Get()]
     x, y, z = np.array(points).T
-    # um: x 0.2, y 0.2, z 0.5 a voxel; stem voxels 6..13, arms to 30, rows 6..42, foot from plane 8
-    # The surface is half-way between the last voxel outside and the first inside, to half a voxel.
+    # A voxel is 0.2 um along x and y, and 0.5 um along z. The stem has voxels 6..13, and arms end
+    # at 30. Rows are 6..42, and the foot starts at plane 8. The surface is half-way between the
+    # last voxel outside and the first inside, to half a voxel.
     assert 5.5 * 0.2 - 0.11 < x.min() < 5.5 * 0.2 + 0.11
     assert 29 * 0.2 - 0.2 < x.max() < 30 * 0.2 + 0.2
     assert -42 * 0.2 - 0.2 < y.min() < -41 * 0.2 + 0.2

@@ -245,7 +245,7 @@ def test_no_flipped_bit_of_the_stage_gets_into_the_bundle(
 def test_file_of_the_bundle_with_a_flipped_bit_is_made_again(
     out: Path, built: Path, name: str
 ) -> None:
-    _go_on(out)  # of a copy, the bundle is of another stage
+    _go_on(out)  # makes the bundle from the copied stage
     _flip(out / "bundle" / name)
     assert f"{name}: not the bytes" in _line(out, "hashes").detail
     _go_on(out)
@@ -394,7 +394,7 @@ def _count_hashed(hashed: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_build_with_nothing_to_do_reads_no_file_of_units_and_stage(
     out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _go_on(out)  # of a copy, the bundle is of another stage
+    _go_on(out)  # makes the bundle from the copied stage
     hashed: list[Path] = []
     _count_hashed(hashed, monkeypatch)
     _go_on(out)

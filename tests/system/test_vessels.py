@@ -25,9 +25,9 @@ BLOOD, TISSUE, NOISE, BLUR = 400.0, 60.0, 6.0, 1.1  # voxel values; voxels
 def _tree() -> tuple[NDArray[np.uint16], NDArray[np.int64]]:
     """Return an angiogram, and the voxels of its centre lines (n, 3).
 
-    A trunk with a radius of 1.8 voxels forks five times. By Murray's law, each branch has 2^(-1/3)
-    of its parent's radius, so the last ones are a voxel wide. Branches are drawn as spheres on a
-    finer grid.
+    A trunk with a radius of 1.8 voxels forks five times. By Murray's law, a branch's radius is
+    2^(-1/3) times its parent's, so the last branches are a voxel wide. Branches are drawn as
+    spheres on a finer grid.
     """
     rng = np.random.default_rng(8)
     fine = np.zeros(tuple(2 * n for n in SHAPE), np.float32)
