@@ -24,8 +24,8 @@ from support.long_files import LONG_FILES
 from support.object_store import VERSITYGW
 from support.small_viewer import write_small_viewer
 
-# Python's collector finds nothing among modules and tests while these are read, and takes a third
-# of the time; what has been read is never looked through again
+# Python's garbage collector finds no garbage while modules and tests are loaded, but takes a third
+# of the time. Loaded objects are later excluded from collection.
 gc.disable()
 
 pytest_plugins = ["support.message_catalogue"]
@@ -35,9 +35,9 @@ CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave sweeps to `make test-exhaustive`, and let files that take long begin.
+    """Leave sweeps to `make test-exhaustive`, and run long files first.
 
-    A process takes files whole and in this order: a long one at the end would run alone.
+    Each process runs whole files in this order. A long file at the end would run alone.
     """
     if not IS_EXHAUSTIVE:
         of_sweeps = {item: item.get_closest_marker("exhaustive") is not None for item in items}
@@ -45,17 +45,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if not of_sweeps[item]]
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
     slow.update(LONG_FILES)
-    items.sort(key=lambda item: -slow[item.path])  # stable: a file's tests stay together
+    items.sort(key=lambda item: -slow[item.path])  # a stable sort keeps a file's tests together
 
 
 def pytest_collection_finish() -> None:
-    """Let Python's collector begin, behind what has been read."""
+    """Start Python's garbage collector, without the objects that have been loaded."""
     gc.enable()
     gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say what ran and what did not: the header is not shown by `-q`."""
+    """Print which tests ran and which did not, because `-q` hides the header."""
     store = "moto" if VERSITYGW is None else "versitygw"
     terminalreporter.write_line(f"object store of the tests: {store}")
     reasons = Counter(
@@ -69,11 +69,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def quick_builds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Spare builds in this process three costs: flushing files, the whole viewer, and workers.
+    """Spare builds in this process three costs: flushing files, copying the viewer, and workers.
 
-    Tests waited longer for the disk than for anything else. The built viewer is 145 files that
-    each bundle copies and hashes. Worker processes import everything again, so a command starts
-    them only where its test says `--workers`.
+    Tests spent most of their time waiting for the disk. The built viewer has 145 files that each
+    bundle copies and hashes. Worker processes import everything again, so a command starts them
+    only if its test passes `--workers`.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda file: None)
@@ -86,19 +86,19 @@ def quick_builds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Builds draw no report: where no test opens it, it is most of what a small one takes."""
+    """Make builds draw no report, which would take most of the time of a small build."""
     monkeypatch.setattr("stereocell.report.phase.run_report", lambda out: None)
 
 
 @pytest.fixture
 def without_node(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Checks start no Node, twice a check: the rules of glTF and KTX2 are for tests/verify."""
+    """Keep checks from starting Node, twice each. tests/verify tests the rules of glTF and KTX2."""
     monkeypatch.setattr("stereocell.verify.node_validators._run_node", lambda script, paths: "")
 
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """An empty file system of 400 kB; it takes root."""
+    """An empty file system of 400 kB; mounting it needs root."""
     disk = tmp_path / "disk"
     disk.mkdir()
     options = ["-t", "tmpfs", "-o", "size=400k"]
@@ -122,7 +122,7 @@ def tiny_zarr_04(tmp_path: Path, voxels: NDArray[np.uint16]) -> Path:
 
 @pytest.fixture
 def tiny_zarr_05(tmp_path: Path, voxels: NDArray[np.uint16]) -> Path:
-    """OME-Zarr 0.5, else as `tiny_zarr_04`."""
+    """OME-Zarr 0.5, otherwise like `tiny_zarr_04`."""
     return _tiny_zarr(tmp_path / "tiny05.ome.zarr", voxels, "0.5")
 
 
@@ -175,7 +175,7 @@ def serve() -> Iterator[Callable[[Path], Server]]:
 def s3_bucket(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder that is the bucket `s3://bucket` (GET, HEAD and ListObjectsV2, unsigned).
 
-    One server for the session: s3fs keeps its client, and with it the address.
+    The session has one server, because s3fs caches its client and so the server's address.
     """
     root = tmp_path_factory.mktemp("s3")
     bucket = root / "bucket"
@@ -208,7 +208,7 @@ class _FileHandler(BaseHTTPRequestHandler):
     folder: Path
     server_log: list[tuple[str, str, str | None]]
     protocol_version = "HTTP/1.1"
-    disable_nagle_algorithm = True  # else each small answer waits 40 ms for an acknowledgement
+    disable_nagle_algorithm = True  # otherwise each small answer waits 40 ms for an ACK
 
     def do_GET(self) -> None:
         self._answer(with_body=True)
@@ -250,7 +250,7 @@ class _FileHandler(BaseHTTPRequestHandler):
             self.send_header(key, value)
         self.end_headers()
         if with_body:
-            # clients hang up on bodies that they only asked the length of
+            # Clients that only want the length close the connection before the body.
             with suppress(ConnectionError):
                 self.wfile.write(content)
 

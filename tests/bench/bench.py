@@ -1,7 +1,7 @@
-"""What `make bench` prints: ratios of two things timed in one run, medians of several rounds.
+"""Print the ratios of `make bench`: two calls timed in one run, medians of several rounds.
 
-Machines are noisy: a ratio within one run says more than seconds, which stand alone only where
-there is nothing to compare with. Nothing here is a test.
+Machines are noisy, so a ratio within one run is more reliable than seconds. Seconds alone are
+printed only where there is nothing to compare with. The bench never fails on a figure.
 """
 
 import statistics
@@ -46,7 +46,7 @@ def nuclei(shape: tuple[int, int, int], count: int, seed: int = 0) -> np.ndarray
 
 
 def compare(name: str, ours: Callable[[], object], peer: Callable[[], object], what: str) -> None:
-    """Time two calls in turns and print the ratio of their medians."""
+    """Time two calls alternately and print the ratio of their medians."""
     seconds: dict[str, list[float]] = {"ours": [], "peer": []}
     for _ in range(ROUNDS):
         for label, call in (("ours", ours), ("peer", peer)):

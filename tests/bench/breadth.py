@@ -1,10 +1,11 @@
-"""What many small units cost from end to end: up to 22 x 11 tiles of 64^3 voxels, four channels.
+"""Measure what many small units cost: up to 22 x 11 tiles of 64^3 voxels, four channels.
 
     python breadth.py FOLDER [GRIDS]      GRIDS: columns x rows, as 4x2,8x4 (up to 22x11)
 
-All grids are cut from one sample, made once (510 MB of voxels): the stains of `sample cycif`, and
-the nuclei once more, mirrored. Prints what each phase takes by each number of units, the seconds of
-CPU that one unit more costs, and by how much the peaks of the command and of a worker grow.
+All grids are cut from one sample, made once (510 MB of voxels). It has the stains of `sample cycif`
+and the mirrored nuclei as another channel. For each number of units, the bench prints the cost of
+each phase. It also prints the CPU seconds that one more unit costs, and the growth of the memory
+peaks of the command and of a worker.
 """
 
 import shutil

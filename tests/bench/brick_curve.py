@@ -1,13 +1,13 @@
-"""How good a picture is after so many bytes: bricks by view against mip levels of the KTX2 file.
+"""Compare pictures after equal bytes: bricks chosen by view, and mip levels of the KTX2 file.
 
     .venv/bin/python tests/bench/brick_curve.py [OUT | FOLDER OF DICOM FILES]
 
-Of a bundle as a build makes it: that of OUT, or one that is built of the images, by the preset mri,
-with its own surface and transfer functions (minutes). The first channel's largest volume is taken.
+The bundle is that of OUT, or is built from the images with the preset mri (minutes), so it has its
+own surface and transfer functions. The largest volume of the first channel is measured.
 
-Also: what building the tree takes, its size, and that it gives the volume back; its size for each
-of the channel's functions. PSNR is that of the volume as a client would sample it
-(tests/support/server/brick_client.py), against the volume, all in sight.
+The bench also prints the time to build the tree, its size, its difference from the volume, and its
+size for each of the channel's functions. PSNR compares the volume as a client would sample it
+(tests/support/server/brick_client.py) with the original, when all of it is in view.
 """
 
 import json
@@ -48,7 +48,7 @@ def main(source: Path) -> int:
             status = stereocell(["build", str(source), "-o", str(out), "--preset", "mri"])
             if status:
                 return status
-        # trees go elsewhere than OUT/bricks, so that they are built anew
+        # Trees go to another folder than OUT/bricks, so they are built again.
         library = BrickLibrary(out / "bundle", Path(folder) / "bricks")
         manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
         channel = manifest["channels"][0]
@@ -97,7 +97,7 @@ def tell_build(voxels: np.ndarray, threshold: int, ktx2_bytes: int) -> None:
 
 
 def tell_functions(bundle: Path, channel: dict, voxels: np.ndarray, ktx2_bytes: int) -> None:
-    """Print what the tree would be, did the stage open with another function."""
+    """Print the size of the tree if the stage opened with another function."""
     rows = decode_finest((bundle / channel["lut"]["path"]).read_bytes())[0]
     print(f"\n{'function':>12} {'threshold':>9} {'bytes':>12} {'of KTX2':>8}")
     for name, row in zip(channel["transfer_functions"], rows, strict=True):
@@ -153,7 +153,7 @@ def tell_stream(out: Path, volume: Volume, voxels: np.ndarray, shown: np.ndarray
 
 
 def look_from_front(entry: dict) -> dict:
-    """Return a camera with all of a volume in sight, from +z; boxes lie before the matrix."""
+    """Return a camera at +z that sees a whole volume; its matrix applies to the box."""
     to_world = np.array(entry["matrix"]).reshape(4, 4).T
     low, high = (np.array(entry["bounds_um"][key]) for key in ("min", "max"))
     middle = (to_world @ np.append((low + high) / 2, 1))[:3]
@@ -163,7 +163,7 @@ def look_from_front(entry: dict) -> dict:
 
 
 def stretch(level: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return a mip level sampled trilinearly at finest texel centres; both cover the same box."""
+    """Sample a mip level trilinearly at the centres of the finest texels of the same box."""
     values = level.astype(np.float32)
     for axis, n in enumerate(shape):
         m = values.shape[axis]

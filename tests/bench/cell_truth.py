@@ -1,8 +1,8 @@
-"""How true, sound and apart the closed surfaces of cells are, for `cells.py`.
+"""Measure for `cells.py` how true and sound the closed surfaces of cells are, and their overlap.
 
-A truth is either known by formula, or, of a mask without one, the faces between its voxels: then a
-surface that is smoother than steps is away from it by a share of a voxel, and only a comparison of
-two surfaces says something.
+The truth of some cells is known by formula. For a mask without such a truth, the faces between its
+voxels are used. Then even a good surface, which is smoother than the steps of voxels, differs by a
+share of a voxel, so only the comparison of two surfaces is informative.
 """
 
 from collections.abc import Sequence
@@ -17,24 +17,24 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.volume import zyx_to_xyz
 
 Points = NDArray[np.float64]  # (n, 3), um, (x, y, z), world
-_RAYS = 20_000  # from a cell's centre, for its volume
+_RAYS = 20_000  # rays from a cell's centre, to integrate its volume
 _GOLDEN = np.pi * (3 - 5**0.5)
 
 
 class Truth(Protocol):
-    """What cells are in truth; `place` counts them from 0."""
+    """The true shapes of cells; `place` counts cells from 0."""
 
     volumes: NDArray[np.float64]  # um^3
 
     def distances(self, place: int, found: Nearest) -> NDArray[np.float64]:
-        """Return the distances (n,) of points spread over both surfaces from the other one, um."""
+        """Return distances (n,), um, of points on each of both surfaces from the other surface."""
 
 
 class BallsCut:
     """Balls round centres (z, y, x), um, cut by the planes midway to other centres.
 
-    Outside, next to an edge, the distance from the nearest plane or sphere stands for that from
-    the edge: it is less, at the obtuse edges of such cells by little.
+    For a point outside, next to an edge, the distance from the nearest plane or sphere replaces the
+    distance from the edge. It is a little smaller, because edges of these cells are obtuse.
     """
 
     def __init__(self, centres: NDArray[np.float64], radius: float, samples: int) -> None:
@@ -60,7 +60,7 @@ class BallsCut:
     def _rays(
         self, place: int, count: int
     ) -> tuple[Points, NDArray[np.float64], NDArray[np.float64]]:
-        """Return directions spread over the sphere, how far they reach, and cosines of arrival."""
+        """Return directions spread over the sphere, lengths of rays, and cosines at the surface."""
         turn = np.arange(count) * _GOLDEN
         z = 1 - (2 * np.arange(count) + 1) / count
         flat = np.sqrt(1 - z * z)
@@ -102,7 +102,7 @@ class VoxelFaces:
 def box_mesh(
     solid: NDArray[np.bool_], start: Sequence[int], spacing_um: tuple[float, float, float]
 ) -> Mesh:
-    """Return the outer faces of voxels, not welded and wound anyhow; `start`: the first voxel."""
+    """Return the outer faces of voxels, not welded, in any winding; `start`: the first voxel."""
     padded = np.pad(solid, 1)
     squares = []
     for axis in range(3):
@@ -118,7 +118,7 @@ def box_mesh(
 
 
 def split(mesh: Mesh, count: int) -> list[Mesh]:
-    """Return each object of a mesh as a mesh by itself; vertices and triangles lie by objects."""
+    """Return each object of a mesh as its own mesh; vertices and triangles are sorted by object."""
     assert mesh.objects is not None
     places = np.arange(count + 1)
     firsts = np.searchsorted(mesh.objects, places)
@@ -143,9 +143,10 @@ def volume_of(mesh: Mesh) -> float:
 
 
 def measure_overlap(parts: Sequence[Nearest], count: int) -> float:
-    """Return the share of what lies in any of the meshes that lies in two or more, 0..1.
+    """Return the share, 0..1, of the meshes' union that lies in two or more meshes.
 
-    Looked at are `count` points of the box of all, of which most of a tissue's lie in some.
+    It tests `count` random points of the box round all meshes, most of which lie in a tissue's
+    cells.
     """
     low = np.min([part.vertices.min(axis=0) for part in parts], axis=0)
     high = np.max([part.vertices.max(axis=0) for part in parts], axis=0)
@@ -163,7 +164,7 @@ def measure_overlap(parts: Sequence[Nearest], count: int) -> float:
 
 
 def numbered(mask: NDArray[Any], fewest: int) -> NDArray[np.int32]:
-    """Return a label map's objects of `fewest` voxels and more as 1 to n; 0 is none.
+    """Number the objects of a label map that have at least `fewest` voxels from 1 to n; 0 is none.
 
     >>> numbered(np.array([0, 7, 9, 9, 8, 9, 7]), 2).tolist()
     [0, 1, 2, 2, 0, 2, 1]

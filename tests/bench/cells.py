@@ -1,15 +1,15 @@
-"""What `make bench-cells` prints: surfaces of touching cells, ours beside zmesh's.
+"""Print the tables of `make bench-cells`: surfaces of touching cells, ours beside zmesh's.
 
-Ours is what a build makes of a label map, without what it measures: seconds and memory of a level
-are those from the labels to it, with all finer ones. zmesh, which igneous meshes with, makes each
-label's surface by itself. Its `max_error` is searched so that it has as many triangles as our level
-of some 450 a cell; the search isn't counted. igneous's own settings are a row too. Each run is a
-process by itself, by turns, medians of --rounds.
+Our rows are the surfaces of a build, without its measurements. Seconds and memory of a level
+include all finer levels. zmesh, the mesher of igneous, makes each label's surface separately. Its
+`max_error` is searched so that it has as many triangles as our level of some 450 per cell; the
+search is not timed. Another row has igneous's own settings. Each run has its own process, programs
+alternate, and rows are medians of --rounds.
 
-Distances go both ways, of points spread over both surfaces: from the truth, where it is known by
-formula, or else from the faces between voxels. Volumes are compared with the truth's or the
-voxels'. Faults are those of the exact check, object by object, as made and on the lattice of our
-.glb, in which all are stored for the bytes.
+Distances are measured in both directions, from points spread over both surfaces. The reference is
+the truth if a formula is known, otherwise the faces between voxels. Volumes are compared with the
+same reference. The exact check finds faults in each object, as made and on the lattice of our .glb.
+For the bytes, all meshes are stored in that .glb.
 """
 
 import argparse
@@ -57,12 +57,12 @@ from support.touching_cells import RADIUS_UM, touching_cells
 
 ROUNDS = 3
 SMALL, LARGE = (48, 112, 112), (112, 368, 368)  # voxels of the phantom
-SPACING_UM = (1.0, 0.5, 0.5)  # of the phantom
-NEAR = 450  # triangles a cell at which peers are compared
-SAMPLES = 500  # points of each of a cell's surfaces
-INSIDE = 200_000  # points that are asked which cells they lie in
-IGNEOUS = 100, 0.04  # reduction_factor and max_error, um, when it isn't told otherwise
-MAX_FACTOR = 1000  # a reduction_factor that leaves it to max_error
+SPACING_UM = (1.0, 0.5, 0.5)  # um, spacing of the phantom (z, y, x)
+NEAR = 450  # triangles per cell at which programs are compared
+SAMPLES = 500  # points on each surface of a cell
+INSIDE = 200_000  # points that are tested for lying in several cells
+IGNEOUS = 100, 0.04  # its default reduction_factor and max_error, um
+MAX_FACTOR = 1000  # a reduction_factor so large that only max_error limits
 HALVINGS = 12
 
 Triple = tuple[float, float, float]
@@ -77,7 +77,7 @@ class Case:
 
     @property
     def step_um(self) -> float:
-        """The step of the lattice of a bundle with this one tile."""
+        """The step of the lattice of a bundle that has only this tile."""
         sizes = np.multiply(self.labels.shape, self.spacing_um)
         return choose_step(float(sizes.max())) * 1e6
 
@@ -86,19 +86,19 @@ class Case:
 class Spent:
     seconds: float
     cpu_s: float
-    peak_mb: float  # above what the process held at its start
+    peak_mb: float  # peak above the memory at the start
 
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Of all objects of a mesh; distances in um, shares in percent."""
+    """Figures of all objects of a mesh; distances in um, shares in percent."""
 
-    triangles: float  # a cell
+    triangles: float  # per cell
     mean: float
     p95: float
     bias: tuple[float, float, float]  # 2nd, 50th and 98th percentile
-    faulty: int  # objects, as made
-    faulty_stored: int  # the same on the lattice
+    faulty: int  # faulty objects as made
+    faulty_stored: int  # faulty objects on the lattice
     overlap: float
     size: int  # bytes
 
@@ -107,10 +107,10 @@ Made = list[tuple[str, Mesh, Spent]]
 
 
 class Meter:
-    """Time and memory since it was made."""
+    """Measures time and memory since its construction."""
 
     def __init__(self) -> None:
-        Path("/proc/self/clear_refs").write_text("5")  # the peak is what is held now
+        Path("/proc/self/clear_refs").write_text("5")  # resets the peak to the present memory
         self._held, _ = _memory_mb()
         self._start, self._cpu = time.perf_counter(), time.process_time()
 
@@ -120,17 +120,17 @@ class Meter:
 
 
 def _memory_mb() -> tuple[float, float]:
-    """Return what the process holds, and the most that it held."""
+    """Return the present and the peak memory of this process."""
     lines = Path("/proc/self/status").read_text("utf-8").splitlines()
     said = dict(line.split(":", 1) for line in lines)
     return int(said["VmRSS"].split()[0]) / 1024, int(said["VmHWM"].split()[0]) / 1024
 
 
 def ours(labels: NDArray[np.int32], spacing_um: Triple, step_um: float) -> Made:
-    """Return all levels."""
+    """Return the meshes of all levels, with their costs."""
     small = np.zeros((9, 9, 9), np.int32)
     small[3:6, 3:6, 2:7] = 1
-    _levels(small, spacing_um, step_um)  # compiled code is loaded
+    _levels(small, spacing_um, step_um)  # loads compiled code before the measurement
     return _levels(labels, spacing_um, step_um)
 
 
@@ -151,7 +151,7 @@ def _levels(labels: NDArray[np.int32], spacing_um: Triple, step_um: float) -> Ma
 def by_zmesh(
     labels: NDArray[np.int32], spacing_um: Triple, factor: int, error: float, name: str
 ) -> Made:
-    mesher = _mesher(labels, spacing_um)  # it loads what it needs
+    mesher = _mesher(labels, spacing_um)  # loads libraries before the measurement
     meter = Meter()
     mesher = _mesher(labels, spacing_um)
     found = [
@@ -162,7 +162,7 @@ def by_zmesh(
     counts = [len(part.vertices) for part in found]
     starts = np.cumsum([0, *counts])
     at = zyx_to_xyz(np.concatenate([part.vertices for part in found])).astype(np.float32)
-    at -= zyx_to_xyz(np.asarray(spacing_um)).astype(np.float32)  # of the padding
+    at -= zyx_to_xyz(np.asarray(spacing_um)).astype(np.float32)  # removes the offset of the padding
     faces = [part.faces.astype(np.int64) + starts[k] for k, part in enumerate(found)]
     triangles = np.concatenate(faces).astype(np.uint32)
     objects = np.repeat(np.arange(len(found), dtype=np.int32), counts)
@@ -171,7 +171,7 @@ def by_zmesh(
 
 def _mesher(labels: NDArray[np.int32], spacing_um: Triple) -> Any:
     mesher = importlib.import_module("zmesh").Mesher(spacing_um)
-    mesher.mesh(np.pad(labels, 1).astype(np.uint32))  # else what ends at the ends stays open
+    mesher.mesh(np.pad(labels, 1).astype(np.uint32))  # padding closes objects at the border
     return mesher
 
 
@@ -185,7 +185,7 @@ def _normals(at: NDArray[np.float32], triangles: NDArray[np.uint32]) -> NDArray[
 
 
 def search_error(labels: NDArray[np.int32], spacing_um: Triple, wanted: float) -> float:
-    """Return the max_error, um, at which zmesh's triangles a cell are nearest to some number."""
+    """Return the max_error, um, with which zmesh makes about this number of triangles per cell."""
     mesher = _mesher(labels, spacing_um)
     some = range(1, int(labels.max()) + 1, max(1, int(labels.max()) // 50))
 
@@ -206,7 +206,7 @@ def search_error(labels: NDArray[np.int32], spacing_um: Triple, wanted: float) -
 def measure(mesh: Mesh, case: Case) -> Figures:
     """Return the figures of a mesh of all the case's objects."""
     count = len(case.truth.volumes)
-    # twice what is needed: a mesh that strays farther from its box gets a coarser lattice
+    # Twice the needed step. A mesh that leaves its box by more gets a coarser lattice.
     step = max(case.step_um, choose_step(float(np.ptp(mesh.positions, axis=0).max()) / 2) * 1e6)
     parts = split(mesh, count)
     there = [k for k in range(count) if len(parts[k].triangles)]  # an object may vanish
@@ -232,19 +232,19 @@ def at_fault(part: Mesh) -> bool:
 
 
 def stored(part: Mesh, step_um: float) -> Mesh:
-    """Return a mesh as a bundle has it."""
+    """Return a mesh as a bundle stores it."""
     at = put_on_lattice(part.positions.astype(np.float64), step_um)
     return replace(part, positions=at.astype(np.float32))
 
 
 def alone(make: Callable[..., Made], *given: Any) -> Made:
-    """Return what is made in a process of its own."""
+    """Run a method in a process of its own; return its meshes."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(make, *given).result()
 
 
 def compare(case: Case, rounds: int) -> list[dict[str, Any]]:
-    """Print a row for each, and return the rows."""
+    """Print a row for each mesh, and return the rows."""
     count = len(case.truth.volumes)
     given = case.labels, case.spacing_um
     ours_run = ours, *given, case.step_um
@@ -288,14 +288,14 @@ def row(name: str, found: Figures, took: Spent, cells: int) -> str:
 
 
 def cases(large: bool, only: str) -> Iterator[Case]:
-    """Yield those whose name begins with `only`, one after another."""
+    """Yield the cases whose name begins with `only`, one after another."""
     if "touching cells".startswith(only):
         labels, centres = touching_cells(LARGE if large else SMALL, SPACING_UM)
         truth = BallsCut(centres, RADIUS_UM, SAMPLES)
         yield Case("touching cells, from the truth", labels, SPACING_UM, truth)
     folder = Path(os.environ.get("STEREOCELL_DATA", ""))
     masks: tuple[tuple[str, str, Triple, Callable[[Path], Any]], ...] = (
-        # its file says no voxel size
+        # The file states no voxel spacing.
         ("nuclei", "nuclei_stardist/mask3d.tif", (1.0, 1.0, 1.0), tifffile.imread),
         ("ovule", "ovule_plantseg/sample_ovule.h5", (0.235, 0.15, 0.15), _ovule),
     )

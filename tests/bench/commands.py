@@ -1,4 +1,4 @@
-"""Samples, plans and the command, for benchmarks that build."""
+"""Make samples and plans, and run the command, for benchmarks that build."""
 
 import shutil
 import subprocess

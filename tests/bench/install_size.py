@@ -1,4 +1,4 @@
-"""What an installation costs on disk, by requirement: itself, and with what it alone brings.
+"""Print disk space by requirement: its own, and with packages that only it brings.
 
 Megabytes (10^6 bytes) of the files that the packages of this environment list, without bytecode.
 """
@@ -27,7 +27,7 @@ for found in distributions():
 
 
 def closure(asked: list[Requirement]) -> set[str]:
-    """Return the installed packages that requirements bring, themselves among them."""
+    """Return the installed packages of requirements and of all that these require."""
     seen: set[tuple[str, str]] = set()
     waiting = [(canonical(one.name), extra) for one in asked for extra in {"", *one.extras}]
     while waiting:

@@ -1,8 +1,8 @@
-"""Levels for a surface over the corpus: Dice, distance, empty volumes, neighbours, confidence.
+"""Judge iso-values over the corpus: Dice, distance, empty volumes, neighbours, confidence.
 
-Every method sees the same denoised field. Peers are thresholds of scikit-image, one for the whole
-volume, and Sauvola's, which follows the surroundings. Criteria that go tile by tile are asked in
-every tile for themselves.
+Every method gets the same denoised field. Peers are global thresholds of scikit-image, and
+Sauvola's, which depends on the surroundings. Criteria that work tile by tile choose a level in each
+tile.
 """
 
 import argparse
@@ -35,12 +35,12 @@ from stereocell.isosurface.options import CRITERIA, IsoValueOptions
 
 OURS = "stereocell"
 RIGHT = 0.7  # Dice from which a surface counts as right
-BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # of confidence
-_SAMPLE = 2_000_000  # voxels that a peer's threshold is found on
-_POINTS = 20_000  # of a truth's boundary, asked for the nearest of what was found
+BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # edges of bins of confidence
+_SAMPLE = 2_000_000  # voxels from which a peer finds its threshold
+_POINTS = 20_000  # points of a true boundary whose distance to the found one is measured
 PEERS: dict[str, Callable[[NDArray[np.float32]], float]] = {
     "Otsu": filters.threshold_otsu,
-    # its own tolerance, the least difference of two voxels, may never be met
+    # Its own tolerance, the least difference of two voxels, may never be reached.
     "Li": lambda values: filters.threshold_li(values, tolerance=1e-5 * float(np.ptp(values))),
     "isodata": filters.threshold_isodata,
     "triangle": filters.threshold_triangle,
@@ -50,9 +50,9 @@ PEERS: dict[str, Callable[[NDArray[np.float32]], float]] = {
 
 @dataclass
 class Found:
-    """One method on one case: the share of voxels inside, and how that fits the truth.
+    """One method on one case: the share of voxels inside, and its agreement with the truth.
 
-    levels  of the tiles that have a surface
+    levels  levels of the tiles that have a surface
     """
 
     inside: float
@@ -63,7 +63,7 @@ class Found:
 
 @dataclass
 class Figures:
-    """One case: what every method found, and ours tile by tile: (confidence, Dice)."""
+    """One case: results of all methods; `tiles` has (confidence, Dice) of ours in each tile."""
 
     name: str
     group: str
@@ -71,8 +71,8 @@ class Figures:
     found: dict[str, Found] = field(default_factory=dict)
     tiles: list[tuple[float, float]] = field(default_factory=list)
     confidence: float = 0.0
-    rung: int = 0  # of the truth
-    rungs: int = 0  # clear ones that were found
+    rung: int = 0  # index of the true level among clear levels
+    rungs: int = 0  # number of clear levels that were found
 
     @property
     def has_truth(self) -> bool:
@@ -84,7 +84,7 @@ def dice(found: Mask, truth: Mask) -> float:
 
 
 class Truth:
-    """A case's truth, whose distances are found once for all methods."""
+    """A case's truth; its distance map is computed once for all methods."""
 
     def __init__(self, inside: Mask, spacing: tuple[float, float, float]) -> None:
         self.inside, self.spacing = inside, np.array(spacing)
@@ -93,7 +93,7 @@ class Truth:
         self._away = ndimage.distance_transform_edt(~edge, spacing) if edge.any() else None
 
     def distance(self, found: Mask) -> float:
-        """Return the mean distance of both boundaries, both ways, in finest voxels."""
+        """Return the mean distance of the boundaries in both directions, in finest spacings."""
         edge = _edge(found)
         if self._away is None or not edge.any():
             return float("nan")
@@ -106,7 +106,7 @@ def _edge(solid: Mask) -> Mask:
 
 
 def _some(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return every nth point, so that a mean over them is good to a hundredth."""
+    """Return every nth point, enough for a mean that is accurate to a hundredth."""
     return points[:: max(1, len(points) // _POINTS)]
 
 
@@ -136,7 +136,7 @@ def measure(number: int) -> Figures:
 
 
 def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
-    """Yield each method's name, what it finds inside, and the tiles' levels."""
+    """Yield each method's name, its mask of the inside, and the tiles' levels."""
     case, values = sight.case, sight.field
     clear = sight.found.shown()
     if clear:
@@ -150,7 +150,7 @@ def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
         value = float(peer(sample))
         yield name, values > value, (value,)
     window = max(3, 2 * round(8 * min(case.spacing_um) / case.spacing_um[1]) + 1)
-    spread = float(np.ptp(np.percentile(sample, (1, 99)))) / 2  # of uint8 it would be 128
+    spread = float(np.ptp(np.percentile(sample, (1, 99)))) / 2  # for uint8, Sauvola uses 128
     local = np.stack(
         [filters.threshold_sauvola(plane, 4 * window + 1, r=spread) for plane in values]
     )
@@ -230,7 +230,7 @@ def print_methods(cases: list[Figures]) -> None:
         cells.append(f"{np.nanmedian([f.away for f in with_truth]):.2f}")
         cells.append(f"{sum(c.found[method].inside > 0 for c in empty)}")
         ratios = [_ratio(f.levels) for f in with_truth if len(f.levels) > 1]
-        # of the ratios themselves: one may be infinite
+        # No interpolation, because a ratio may be infinite.
         most = np.quantile(ratios, 0.9, method="inverted_cdf") if ratios else None
         cells.append("-" if most is None else f"x {most:.3g}")
         print(f"| {method} | " + " | ".join(cells) + " |")
@@ -243,7 +243,7 @@ def _ratio(levels: tuple[float, ...]) -> float:
 
 
 def print_confidence(what: str, judged: list[tuple[float, float]]) -> None:
-    """Print what confidences are worth, of pairs of one and a Dice."""
+    """Print how well confidence predicts Dice, from pairs (confidence, Dice)."""
     print(f"\n| confidence of {what} | count | share with Dice > {RIGHT} | mean Dice |")
     print("|---|---|---|---|")
     for low, high in pairwise(BINS):
@@ -256,19 +256,19 @@ def print_confidence(what: str, judged: list[tuple[float, float]]) -> None:
 
 
 def print_inner(cases: list[Figures]) -> None:
-    """Print what rungs within the first are worth, and how many are found where there are none."""
+    """Print how good inner levels are, how many are missed, and how many are found in excess."""
     within = [case for case in cases if case.rung]
     missed = [case.name for case in within if case.rungs <= case.rung]
     judged = [(c.confidence, c.found[OURS].dice) for c in within if c.name not in missed]
     print_confidence("an inner rung", judged)
     print(f"\ninner rungs that are missed: {len(missed)} of {len(within)} {missed}")
-    alike = [case for case in cases if ", x 1," in case.name]  # the family's bodies of one height
+    alike = [case for case in cases if ", x 1," in case.name]  # bodies of equal brightness
     further = sum(max(0, case.rungs - 1) for case in alike)
     print(f"further rungs on {len(alike)} volumes whose bodies are all alike: {further}")
 
 
 def print_looks(cases: list[Figures]) -> None:
-    """Print what share of a volume without a truth each method takes for inside."""
+    """Print the share of a volume without a truth that each method finds inside."""
     for case in cases:
         shares = ", ".join(f"{name} {found.inside:.2%}" for name, found in case.found.items())
         print(f"\n{case.name}, inside: {shares}; confidence {case.confidence:.2f}")

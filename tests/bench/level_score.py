@@ -1,7 +1,7 @@
-"""Compare a scored choice of the level with the tests in a row, one source held out at a time.
+"""Compare a scored choice of the level with a sequence of tests, holding out one source at a time.
 
-Every level of a ladder gets six features; a logistic function of them is its probability to be
-right. It is fitted on the volumes of all other sources, so that no volume is judged by itself.
+Every level has six features, and a logistic function of them gives the probability that the level
+is right. The function is fitted on the volumes of all other sources, so no volume judges itself.
 docs/decisions/levels.md has the results.
 """
 
@@ -37,9 +37,9 @@ class Ladder:
 
     source    volumes of one source are held out together
     features  float64 (levels, 6)
-    dice      of each level with the truth; empty volumes: 0
-    tree      index of the level that the tests in a row take; None: no surface
-    likely    indices of the clear levels and those outside of them that are nearly clear
+    dice      Dice of each level with the truth; 0 for empty volumes
+    tree      index of the level that the sequence of tests chooses; None: no surface
+    likely    indices of the clear levels, and of nearly clear levels outside of these
     """
 
     name: str
@@ -57,7 +57,7 @@ def measure(number: int) -> Ladder:
     sight = look_at(case)
     levels, shown = sight.found.all_levels, sight.found.shown()
     if clear_of(levels) and not shown:
-        levels = ()  # noise or uneven light: no choice of a level is asked for
+        levels = ()  # noise or uneven light; no level is to be chosen
     clear = [k for k, level in enumerate(levels) if level in shown]
     scores = [
         0.0 if sight.truth is None else dice(sight.values > level.value, sight.truth)
@@ -78,7 +78,7 @@ def measure(number: int) -> Ladder:
 
 
 def _features(level: Level, place: int) -> list[float]:
-    """Return the numbers that speak for a level; steep ones as logarithms, within bounds."""
+    """Return the features of a level, within bounds; steep ones are logarithms."""
     apart = max(
         (bounds.DIP - level.dip) / 0.2,
         (level.separation - bounds.MIN_SEPARATION) / 0.03,

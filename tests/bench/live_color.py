@@ -1,10 +1,10 @@
-"""How far the colour of a first view is from that of the built bundle: CIEDE2000 of the means.
+"""Compare the colours of a first view and of the built bundle by CIEDE2000 of the means.
 
     .venv/bin/python tests/bench/live_color.py [SOURCE ...]
 
-Of each source the first view is written and the bundle is built, by the command, and both are drawn
-with the view with which they open, with a focus disc and without one. The mean is that of all
-pixels that are not background. The sources are those of live_view.py.
+For each source, the command writes the first view and builds the bundle. Both are drawn with their
+opening view, with a focus disc and without one. The mean covers all pixels except background. The
+sources are those of live_view.py.
 """
 
 import subprocess
@@ -25,10 +25,10 @@ from stereocell.planning.preset_choice import load_for
 from stereocell.planning.settle import settle
 from stereocell.steps.open_source import open_source
 
-BOUND = 8.0  # CIEDE2000 at which the built specimen would look like another one
-MODES = ("disc", "stage")  # that with which a page opens, and surfaces alone
+BOUND = 8.0  # CIEDE2000; above it the built specimen would look like another one
+MODES = ("disc", "stage")  # the mode with which a page opens, and surfaces alone
 VIEWER = Path(__file__).parents[2] / "viewer_gltf"
-_PAST = 12  # of 255, by which a pixel differs from the background
+_PAST = 12  # difference from the background, 0..255, above which a pixel counts
 _CANVAS = (slice(70, 600), slice(0, 960))  # rows and columns of a picture without panel and marks
 
 

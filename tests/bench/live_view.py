@@ -1,13 +1,13 @@
-"""How soon a source is seen, at which cost, and how quickly its server answers beside a build.
+"""Measure how soon a source is visible, the cost, and the server's latency during a build.
 
     .venv/bin/python tests/bench/live_view.py [SOURCE ...]
 
-The sources are those of `STEREOCELL_DATA`, and samples. Of each, `stereocell view` is started once,
-so that the disk is warm and Python has its bytecode, and then ROUNDS times without a build: seconds
-from the start of the command until the page, and until all files of the first view have been
-fetched; CPU seconds until then; the bytes of those files, and of the page's own. Then one file is
-asked for again and again, alone and beside the build. Other processes make seconds longer, and CPU
-seconds less so: the load of the machine is printed with them.
+The sources are those of `STEREOCELL_DATA`, and samples. For each source, `stereocell view` first
+starts once, so that the files are cached and Python has its bytecode. Then it starts ROUNDS times
+without a build. The table has seconds from the start of the command to the page, and to the end
+of fetching the first view's files; the CPU seconds until then; and the bytes of these files and of
+the page. Then one file is requested again and again, alone and during the build. Other processes
+lengthen seconds more than CPU seconds, so the load of the machine is printed, too.
 """
 
 import json
@@ -35,7 +35,7 @@ SOURCES = {
     "mouse brain": [f"{DATA}/mouse_brain/mouse_brain.ome.tif", "--spacing-um", "25,25,25"],
     "nuclei": [f"{DATA}/nuclei_stardist/img3d.tif", "--spacing-um", "1,0.5,0.5"],
 }
-# arguments of `stereocell sample`, and flags with which its result is built
+# Arguments of `stereocell sample`, and the flags of the sample's build
 SAMPLES = {
     "CyCIF sample": (["cycif", "cycif.ome.zarr", "--grid", "3x2"], ["--grid", "3x2"]),
     "head sample": (["mri", "mri"], []),
@@ -43,7 +43,7 @@ SAMPLES = {
     "brain sample": (["brain-cells", "brain-cells.ome.tif"], []),
 }
 _COMPRESSED = {"Accept-Encoding": "br, gzip"}
-# Variables of this process that a person's terminal lacks: Python would compile all it imports
+# Variables that a user's terminal lacks. With them, Python would compile all imports.
 _UNSET = ("PYTHONDONTWRITEBYTECODE",)
 
 
@@ -80,7 +80,7 @@ def measured(flags: list[str], folder: str) -> str:
         _,
     ):
         files = fetch_view(address)
-        time.sleep(5)  # the build has begun by then
+        time.sleep(5)  # the build has begun after this time
         beside = latencies_ms(address, max(files, key=lambda path: files[path]))
     page_s, view_s, spent_s, megabytes = map(statistics.median, zip(*first, strict=True))
     return (
@@ -92,7 +92,7 @@ def measured(flags: list[str], folder: str) -> str:
 
 @contextmanager
 def viewing(flags: list[str], folder: str) -> Iterator[tuple[subprocess.Popen[str], str, float]]:
-    """Yield `stereocell view`, its address, and when it was started."""
+    """Run `stereocell view`; yield its process, its address and its time of start."""
     began_s = time.perf_counter()
     command = [sys.executable, "-m", "stereocell.cli", "view", *flags]
     with subprocess.Popen(
@@ -125,14 +125,14 @@ def fetch_view(address: str) -> dict[str, int]:
 
 
 def fetch_page(address: str) -> int:
-    """Fetch the page with its scripts and styles; return their bytes, as they are compressed."""
+    """Fetch the page with its scripts and styles; return their compressed bytes."""
     text = get(address).decode()
     paths = set(re.findall(r"assets/[\w-]+\.(?:js|css)\b(?!\.)", text))
     return sum(len(get(address + path, **_COMPRESSED)) for path in ("", *paths))
 
 
 def latencies_ms(address: str, path: str) -> tuple[float, float]:
-    """Return the median and the 95th percentile of the time that a file's first 64 kB take, ms."""
+    """Return the median and 95th percentile of the time, ms, to fetch a file's first 64 kB."""
     took = []
     for _ in range(REQUESTS):
         start = time.perf_counter()

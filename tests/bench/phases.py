@@ -1,4 +1,4 @@
-"""The phases of a build, one after another as commands, and what each takes."""
+"""Run the phases of a build one after another as commands, and measure each."""
 
 import subprocess
 import tempfile
@@ -13,13 +13,13 @@ from commands import STEREOCELL
 from support.worker_processes import workers_of
 
 PHASES = ("units", "stage", "bundle", "report", "check")  # after the plan
-OFTEN_S = 0.2  # from one look at the processes to the next
+OFTEN_S = 0.2  # seconds between two looks at the processes
 MB = 1e6
 
 
 @dataclass
 class Cost:
-    """What a command took: seconds, those of CPU, and the most bytes of a process by its role."""
+    """Cost of a command: seconds, CPU seconds, and peak bytes of a process by role."""
 
     seconds: float = 0.0
     cpu: float = 0.0
@@ -27,10 +27,10 @@ class Cost:
 
 
 def watch(arguments: list[str], others: list[psutil.Process]) -> Cost:
-    """Run a command to its end and look at its processes; `others` work for it."""
+    """Run a command and measure its processes and `others`, which work for it."""
     cost, start = Cost(), time.perf_counter()
     before = sum(_cpu_of(other) for other in others)
-    # not a pipe: nobody reads it meanwhile, so it would fill and stop the command
+    # A pipe that is not read would fill up and stop the command.
     with tempfile.TemporaryFile("w+") as told:
         command = subprocess.Popen(
             [*STEREOCELL, *arguments], stdout=subprocess.DEVNULL, stderr=told
@@ -50,7 +50,7 @@ def watch(arguments: list[str], others: list[psutil.Process]) -> Cost:
 def _look(
     parent: psutil.Process, others: list[psutil.Process], cost: Cost, spent: dict[int, float]
 ) -> None:
-    """Note the memory of all processes, and the seconds of CPU of each of the command's own."""
+    """Record the memory of all processes, and the CPU seconds of the command's own processes."""
     try:
         for process, role in [
             (parent, "command"),
@@ -60,7 +60,7 @@ def _look(
             if process not in others:
                 spent[process.pid] = _cpu_of(process)
     except psutil.Error:
-        pass  # it ended while it was looked at
+        pass  # the process ended meanwhile
 
 
 def _cpu_of(process: psutil.Process) -> float:
@@ -71,10 +71,10 @@ def _cpu_of(process: psutil.Process) -> float:
 def run_phases(
     out: Path, plan: list[str], how: list[str], others: list[psutil.Process]
 ) -> dict[str, Cost]:
-    """Run all phases, print what each takes, and return it.
+    """Run all phases, print their costs, and return them.
 
     plan    arguments of `stereocell plan`
-    how     arguments that say where units are built
+    how     arguments that state where units are built
     others  processes that work for the commands
     """
     costs = {}

@@ -1,7 +1,8 @@
-"""What builds read of their source, and what the whole CyCIF dataset's would.
+"""Measure how much builds read of their source, and estimate it for the whole CyCIF dataset.
 
-How much more a build reads than the chunks that it touches is measured, on small tiles; how many
-chunks the dataset's tiles touch is counted, one by one, as small tiles touch other shares of them.
+The ratio of the bytes read to the bytes of touched chunks is measured on small tiles. The chunks
+that the dataset's tiles touch are counted one by one, because small tiles touch other shares of
+chunks.
 """
 
 import itertools
@@ -31,20 +32,20 @@ from support.phantoms import write_ome_zarr
 
 REAL = (194, 512, 512)
 REGION, CHANNELS = Box((0, 0, 0), (194, 5508, 10908)), 70  # the dataset
-CHUNK = (32, 128, 128)  # as the sample's: four to a tile's width, six to its depth
-MAX_READ = 1.3  # bytes read over those of the chunks that what is wanted touches
+CHUNK = (32, 128, 128)  # four to a tile's width, six to its depth, as in the sample
+MAX_READ = 1.3  # ratio of the bytes read to the bytes of touched chunks
 
 
 @contextmanager
 def counting(folder: Path) -> Iterator[tuple[str, dict[str, int]]]:
-    """Serve a folder; count the bytes of each file that were sent."""
+    """Serve a folder; count the bytes that are sent of each file."""
     sent: dict[str, int] = defaultdict(int)
     lock = threading.Lock()
 
     class Handler(SimpleHTTPRequestHandler):
         def copyfile(self, source: object, outputfile: object) -> None:
             file = Path(self.translate_path(self.path))
-            if file.is_file():  # no listing of a folder
+            if file.is_file():  # listings of folders are not counted
                 with lock:
                     sent[str(file)] += file.stat().st_size
             super().copyfile(source, outputfile)  # type: ignore[arg-type]
@@ -65,11 +66,11 @@ def counting(folder: Path) -> Iterator[tuple[str, dict[str, int]]]:
 
 @dataclass(frozen=True)
 class Reading:
-    """Bytes that builds read, as they are stored.
+    """Stored bytes that builds read.
 
-    chunks   a unit's, over those of the chunks that its window touches
-    window   a unit's, over those of the window itself
-    check    what a command reads to see that the source is the one that was planned (64 MB at most)
+    chunks   bytes that a unit reads, as a ratio to the chunks that its window touches
+    window   bytes that a unit reads, as a ratio to the window itself
+    check    bytes that a command reads to recognise the planned source (64 MB at most)
     """
 
     chunks: float
@@ -79,10 +80,10 @@ class Reading:
 
 @dataclass(frozen=True)
 class Survey:
-    """Bytes read for iso-values, tiles as wide as with REAL and CHUNK: four chunks.
+    """Bytes read for iso-values, if tiles are four chunks wide, as with REAL and CHUNK.
 
-    chunks  over those of the chunks that the tiles touch
-    tiles   over those of the tiles themselves
+    chunks  ratio to the bytes of the chunks that the tiles touch
+    tiles   ratio to the bytes of the tiles themselves
     """
 
     chunks: float
@@ -94,13 +95,13 @@ def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
     out = folder / "reading"
     with counting(folder) as (address, sent):
         plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
-        check = take(sent)  # a plan reads nothing else
-        for unit in ("r0_c0/0", "r1_c1/0"):  # the first one, and the survey of all nine
+        check = take(sent)  # a plan reads only what it checks
+        for unit in ("r0_c0/0", "r1_c1/0"):  # the first command also surveys all nine tiles
             take(sent)
             call("units", str(out), "--workers", "0", "--only", unit)
         read = take(sent) - check
     settled = OutFolder(out).plan()
-    middle = settled.tile("r1_c1")  # it has neighbours all round
+    middle = settled.tile("r1_c1")  # this tile has neighbours on all sides
     window = middle.lattice(settled.region).grown(settled.halo, settled.region)
     size = stored(source, window)
     share = math.prod(window.shape) / touched(window, chunk_of(source), settled.region)
@@ -108,7 +109,7 @@ def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
 
 
 def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
-    """Survey 3 x 3 tiles, in this process, so that iso-values are told from windows."""
+    """Survey 3 x 3 tiles in this process, to separate the reads for iso-values and for windows."""
     source = chop_sample(folder, tile)
     out = folder / "survey"
     with counting(folder) as (address, sent):
@@ -129,7 +130,7 @@ def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
 
 
 def measure_windows(folder: Path, source: Path) -> float:
-    """Return what is read for the window of one tile of REAL, over what that is found from."""
+    """Return the bytes read for the window of a tile of REAL, over the bytes that it needs."""
     out = folder / "windows"
     with counting(folder) as (address, sent):
         plan(f"{address}/{source.name}", out, (1, 1), REAL, "0")
@@ -145,7 +146,7 @@ def measure_windows(folder: Path, source: Path) -> float:
 
 
 def chop_sample(folder: Path, tile: tuple[int, int, int]) -> Path:
-    """Return 3 x 3 tiles of which each has as many chunks as one of REAL has of CHUNK."""
+    """Return 3 x 3 tiles; each has as many chunks as a tile of REAL has chunks of CHUNK."""
     path = folder / f"chopped_{'_'.join(map(str, tile))}.ome.zarr"
     if not path.exists():
         voxels: np.ndarray = zarr.open_array(make_sample(folder, (3, 3), tile) / "0")[:1]  # type: ignore
@@ -157,7 +158,7 @@ def chop_sample(folder: Path, tile: tuple[int, int, int]) -> Path:
 
 
 def take(sent: dict[str, int]) -> int:
-    """Return the bytes of voxels that were sent, and count from 0."""
+    """Return the bytes of voxels that were sent, and reset the count."""
     size = sum(size for file, size in sent.items() if not file.endswith(".json"))
     sent.clear()
     return size
@@ -176,7 +177,7 @@ def stored(source: Path, box: Box) -> int:
     ]
     places = itertools.product([0], *along)
     files = [source / "0" / array.metadata.encode_chunk_key(place) for place in places]
-    return sum(file.stat().st_size for file in files if file.exists())  # not where all is 0
+    return sum(file.stat().st_size for file in files if file.exists())  # zeros have no file
 
 
 def touched(box: Box, chunk: tuple[int, ...], region: Box) -> int:
@@ -186,7 +187,7 @@ def touched(box: Box, chunk: tuple[int, ...], region: Box) -> int:
 
 
 def under_blocks(region: Box, chunk: tuple[int, ...]) -> int:
-    """Return how many voxels lie in the chunks of the blocks that edges are looked for in."""
+    """Return the number of voxels in the chunks of the blocks in which edges are searched."""
     blocks = [box.grown((1, 1, 1), region) for box in sample_boxes(region, JOINT_VOXELS)]
     return sum(touched(block, chunk, region) for block in blocks)
 
@@ -204,10 +205,10 @@ def print_reading(reading: Reading, survey: Survey, windows: float) -> None:
 def print_whole(
     reading: Reading, survey: Survey, windows: float, voxel: float, halo: tuple[int, int, int]
 ) -> None:
-    """Print what the dataset reads: chunks that are counted, times the ratios that were measured.
+    """Print the estimated reads of the dataset: counted chunks times measured ratios.
 
-    windows  what measure_windows() returns
-    voxel    bytes of one, as it is stored
+    windows  ratio that measure_windows() returns
+    voxel    stored bytes of a voxel
     """
     tiles = cut(REGION, REAL)
     grown = [tile.lattice(REGION).grown(halo, REGION) for tile in tiles]

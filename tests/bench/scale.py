@@ -1,14 +1,14 @@
-"""What units cost in time, memory and bytes read, and what the whole dataset would.
+"""Measure time, memory and reads of units, and estimate them for the whole dataset.
 
     python scale.py FOLDER [TILE]      TILE: z,y,x voxels of the slope's tiles
 
-Small tiles, 4 to 32 of them, all alike, tell how time and memory grow with their number, hundreds
-of the smallest what the command itself keeps of each, and one of 194 x 512 x 512, full of nuclei,
-what a real one takes: twenty minutes in all. Samples and builds stay in FOLDER: they are made once.
-Ends with 1 where a bound is not kept.
+Runs with 4 to 32 equal small tiles show how time and memory grow with the number of tiles. Hundreds
+of tiny tiles show how much memory the command keeps for each. One tile of 194 x 512 x 512 voxels,
+full of nuclei, shows the cost of a real tile. All takes twenty minutes. Samples and builds stay in
+FOLDER and are made once. Exits with 1 if a bound is exceeded.
 
-The dataset's figures are those of its units, which nearly all of the work is. Its stage, bundle and
-report are not in them. What it reads: reading.py.
+The dataset's figures cover its units, which are nearly all of the work, but not its stage, bundle
+and report. reading.py estimates the reads.
 """
 
 import json
@@ -46,14 +46,14 @@ from support.phantoms import write_ome_zarr
 from support.worker_processes import workers_of
 
 COUNTS = ((2, 2), (4, 2), (4, 4), (8, 4))  # columns x rows: 4 to 32 units
-MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512
+MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512 units
 WHOLE = len(cut(REGION, REAL)) * CHANNELS  # units of the CyCIF dataset
 PRICE = 0.04  # dollars for a core-hour: about what clouds ask for a core with 4 GB
 GIB = 1024**3
-MAX_GROWTH = 0.1  # of a process's peak, from some tiles to four times as many
-MAX_BYTES = 2e9  # of the process that builds a unit of REAL
+MAX_GROWTH = 0.1  # growth of a process's peak when there are four times as many tiles
+MAX_BYTES = 2e9  # peak of the process that builds a unit of REAL
 
-# Run in a process of its own, which builds one unit and looks at itself meanwhile
+# Runs in a process of its own, which builds one unit and measures its own memory meanwhile.
 WATCHED = """
 import collections, json, sys, threading, time
 from stereocell.cli.__main__ import main
@@ -87,8 +87,7 @@ print(json.dumps({"code": code, "before": before, "most": most, "peak": peak}))
 
 @dataclass(frozen=True)
 class Run:
-    """A run of `stereocell units`: its seconds, and the most memory that a process had, by what it
-    does: "command", "worker"."""
+    """A run of `stereocell units`: its seconds, and the peak memory of a "command" or "worker"."""
 
     units: int
     workers: int
@@ -97,7 +96,7 @@ class Run:
 
 
 def repeat_sample(folder: Path, grid: tuple[int, int], tile: tuple[int, int, int]) -> Path:
-    """Return tiles that are copies of one: its nuclei, whose sizes would tell of themselves."""
+    """Return tiles that are copies of one, because different nuclei would change the cost."""
     path = folder / f"copies_{'_'.join(map(str, grid + tile))}.ome.zarr"
     if not path.exists():
         one: np.ndarray = zarr.open_array(make_sample(folder, (1, 1), tile) / "0")[0]  # type: ignore
@@ -109,7 +108,7 @@ def repeat_sample(folder: Path, grid: tuple[int, int], tile: tuple[int, int, int
 
 
 def run_units(out: Path, workers: int) -> Run:
-    """Build all units, and look at the processes meanwhile."""
+    """Build all units, and measure the processes meanwhile."""
     start = time.perf_counter()
     command = subprocess.Popen(
         [*STEREOCELL, "units", str(out), "--workers", str(workers)],
@@ -124,7 +123,7 @@ def run_units(out: Path, workers: int) -> Run:
             for process in workers_of(parent):
                 peaks["worker"] = max(peaks["worker"], _peak_of(process.pid))
         except (psutil.Error, OSError):
-            pass  # it ended while it was looked at
+            pass  # the process ended meanwhile
         time.sleep(0.2)
     if command.returncode:
         raise SystemExit(f"units {out}: ended with {command.returncode}")
@@ -154,7 +153,7 @@ def measure_slope(
 
 
 def print_slope(runs: list[Run]) -> list[float]:
-    """Return by how much each process's peak grew from some tiles to four times as many."""
+    """Print costs per unit; return the growth of each peak for four times as many tiles."""
     growths = []
     for workers in (1, 2):
         own = {run.units: run for run in runs if run.workers == workers}
@@ -178,8 +177,7 @@ def print_command(runs: list[Run]) -> None:
 
 
 def watch_memory(out: Path) -> dict[str, int]:
-    """Build OUT's one unit in a process that watches itself; return most bytes, by function and
-    of all."""
+    """Build OUT's one unit in a process that measures itself; return peak bytes by function."""
     answer = subprocess.run(
         [sys.executable, "-c", WATCHED, "units", str(out), "--workers", "0"],
         capture_output=True, text=True, check=True,

@@ -1,14 +1,16 @@
-"""The paper's scene from end to end: ten tiles, three channels, by 1 worker, 2, and a cluster.
+"""Measure the paper's whole scene, ten tiles and three channels, by 1, 2 workers or a cluster.
 
     python scene.py FOLDER [GRID [TILE [WAYS]]]
 
-GRID: columns x rows (5x2), TILE: z,y,x voxels (194,512,512), WAYS: of 1, 2 and `cluster`, with
-commas between (all). The sample is made once (300 MB) and stays in FOLDER, as the last build does.
+GRID: columns x rows (5x2). TILE: z,y,x voxels (194,512,512). WAYS: any of 1, 2 and `cluster`,
+separated by commas (all). The sample is made once (300 MB). It stays in FOLDER, like the last
+build.
 
-Prints seconds and CPU seconds of each phase, the most memory of the command and of a worker, what
-the build takes on disk, by kind and level of detail, what a viewer reads before the first picture,
-and what it has on screen and on the GPU while the gaze walks over all tiles. Ends with 1 where two
-ways have not the same bytes, or the gaze has missed a tile.
+Prints seconds and CPU seconds of each phase, and the peak memory of the command and of a worker.
+Then it prints the build's size on disk by kind and level of detail, and the bytes that a viewer
+reads before the first picture. Last come the triangles and bytes that the viewer draws and holds
+while the gaze moves over all tiles. Exits with 1 if two ways gave different bytes, or the gaze
+missed a tile.
 """
 
 import shutil
@@ -35,7 +37,7 @@ COMPARED = ("stage", "bundle")
 
 
 def build(source: Path, out: Path, grid: tuple[int, int], way: str) -> dict[str, Cost]:
-    """Build OUT in one of the ways; return what each phase took."""
+    """Build OUT in one of the ways; return the cost of each phase."""
     columns, rows = grid
     plan = [str(source), "--preset", "cycif", "--level", "0", "--grid", f"{columns}x{rows}"]
     if way == "cluster":
@@ -46,7 +48,7 @@ def build(source: Path, out: Path, grid: tuple[int, int], way: str) -> dict[str,
 
 
 def print_sizes(out: Path) -> None:
-    """Print what the build takes, and of that what counts on a phone."""
+    """Print the size of the build, and the part of it that matters on a phone."""
     for part in ("units", "stage", "bundle", "report"):
         print(f"  {part:7}{_bytes(*(out / part).rglob('*')) / MB:9.1f} MB")
     grids = [grid for file in (out / "stage").rglob("*.vdb") for grid in read_vdb_head(file)]
@@ -68,7 +70,7 @@ def print_sizes(out: Path) -> None:
 
 
 def walk_over(bundle: Path) -> bool:
-    """Print what the viewer holds while the gaze walks; return whether it came to all tiles."""
+    """Print what the viewer holds while the gaze moves; return whether it reached all tiles."""
     if shutil.which("npm") is None:
         print("  no walk: no node and npm")
         return True

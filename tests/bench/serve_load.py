@@ -1,11 +1,11 @@
-"""Fifty clients with random views for a minute: views, bytes, errors, and the server's memory.
+"""Load a server by fifty clients with random views for a minute; print errors, bytes and memory.
 
     .venv/bin/python tests/bench/serve_load.py [--clients 50] [--seconds 60] [FOLDER OF DICOM FILES]
 
-The server is `stereocell serve` in a process of its own, the clients share another. A client asks
-by a random view with a random budget, waits for the end, or now and then asks anew before it; it
-drops what it has one time in three, so that there is always something to send. Every frame is taken
-apart, one brick in twenty held against its hash.
+The server is `stereocell serve` in a process of its own; the clients share another process. A
+client sends a random view with a random budget and waits for the end, or sometimes sends the next
+view earlier. One time in three it drops its bricks, so the server always has bricks to send. Every
+frame is parsed, and one brick in twenty is compared with its hash.
 """
 
 import argparse
@@ -49,7 +49,7 @@ class Totals:
 
 
 async def visit(address: str, seed: int, until: float, totals: Totals) -> None:
-    """Be one client."""
+    """Act as one client."""
     rng = random.Random(seed)
     try:
         async with connect(address, compression=None, max_size=1 << 20) as stream:

@@ -1,6 +1,6 @@
-"""How long `import stereocell` and `stereocell --help` take, beside Python that does nothing.
+"""Time `import stereocell` and `stereocell --help`, beside a Python that does nothing.
 
-Of each the least and the median of ROUNDS processes; bytecode and files are in the system's cache.
+Prints minimum and median of ROUNDS processes; bytecode and files are in the system's cache.
 """
 
 import statistics

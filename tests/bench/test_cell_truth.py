@@ -1,4 +1,4 @@
-"""What `make bench-cells` measures, on shapes whose figures are known."""
+"""The measures of `make bench-cells` are right for shapes whose figures are known."""
 
 import numpy as np
 import pytest
@@ -11,9 +11,9 @@ from support.meshes import ball, joined, moved
 SAMPLES = 2000
 
 
-def test_a_ball_is_as_far_from_a_smaller_one_as_radii_differ() -> None:
+def test_distance_of_two_balls_is_the_difference_of_their_radii() -> None:
     truth = BallsCut(np.array([[3.0, 2.0, 1.0]]), 4.5, SAMPLES)
-    found = moved(ball(5.0, 120), (1.0, -2.0, 3.0))  # (x, y, z) is (x, -y, z) of the array's axes
+    found = moved(ball(5.0, 120), (1.0, -2.0, 3.0))  # world (x, y, z) is (x, -y, z) of the array
     away = truth.distances(0, Nearest(found, SAMPLES))
     assert len(away) == 2 * SAMPLES
     np.testing.assert_allclose(away, 0.5, atol=0.005)
@@ -21,23 +21,24 @@ def test_a_ball_is_as_far_from_a_smaller_one_as_radii_differ() -> None:
     assert volume_of(found) == pytest.approx(4 / 3 * np.pi * 125, rel=2e-3)
 
 
-def test_the_plane_between_two_balls_cuts_both() -> None:
+def test_plane_between_two_balls_cuts_both() -> None:
     truth = BallsCut(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 6.0]]), 5.0, SAMPLES)
-    height = 2.0  # of the cap beyond the plane
+    height = 2.0  # um, height of the cap beyond the plane
     cap = np.pi * height**2 * (5.0 - height / 3)
     np.testing.assert_allclose(truth.volumes, 4 / 3 * np.pi * 125 - cap, rtol=1e-4)
     points = truth._points(0)
     on_plane = np.isclose(points[:, 0], 3.0)
     np.testing.assert_allclose(np.linalg.norm(points[~on_plane], axis=1), 5.0)
     disc, rest = np.pi * 16, 4 * np.pi * 25 - 2 * np.pi * 5 * height
-    assert on_plane.mean() == pytest.approx(disc / (disc + rest), abs=0.01)  # evenly over the area
-    # of a whole ball, the cap is beyond the plane: its top by 2 um
+    # Points are spread evenly over the area.
+    assert on_plane.mean() == pytest.approx(disc / (disc + rest), abs=0.01)
+    # The cap of a whole ball lies beyond the plane, its top by 2 um.
     away = truth.distances(0, Nearest(ball(5.0, 120), SAMPLES))[:SAMPLES]
     assert away.max() == pytest.approx(height, abs=0.05)
     assert (away < 0.01).mean() == pytest.approx(1 - height / 10, abs=0.01)
 
 
-def test_a_box_lies_on_its_voxels_faces() -> None:
+def test_box_lies_on_the_faces_of_its_voxels() -> None:
     labels = np.zeros((6, 7, 8), np.int32)
     labels[2:4, 1:4, 3:7] = 1
     spacing = (2.0, 1.0, 0.5)
@@ -55,7 +56,7 @@ def test_a_box_lies_on_its_voxels_faces() -> None:
 
 
 @pytest.mark.slow
-def test_overlap_is_the_share_of_what_any_has() -> None:
+def test_overlap_is_a_share_of_the_union() -> None:
     near = [Nearest(ball(5.0, 60), 1), Nearest(moved(ball(5.0, 60), (6.0, 0.0, 0.0)), 1)]
     lens = np.pi * 4 * (3 * 5 - 2) / 3 * 2
     whole = 2 * 4 / 3 * np.pi * 125 - lens

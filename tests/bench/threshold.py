@@ -1,9 +1,10 @@
-"""The adaptive threshold, Otsu's and Li's on the head phantom: values, voxels above, Dice.
+"""Compare the adaptive threshold with Otsu's and Li's on the head phantom: values, shares, Dice.
 
-The truth is the head with all that is in it (air is dark, bone nearly so, fluid darker than tissue)
-and the brain's matter, grey and white: which of them a threshold is for depends on where it falls.
-Below, how the adaptive one was read of each histogram: its peaks, and what was left out as chance;
-with --images FOLDER of images of one's own, too, in the preset's window and in their full range.
+There are two truths: the whole head, and the brain's grey and white matter. Air is dark, bone
+nearly as dark, and fluid darker than tissue. A threshold's value decides which truth it can match.
+A second table states how the adaptive threshold reads each histogram: its peaks, and those that it
+ignores as chance. With --images FOLDER, it also reads your own images, in the preset's window and
+in full range.
 """
 
 import sys
@@ -21,7 +22,7 @@ from stereocell.transfer.channel_statistics import find_statistics
 from stereocell.transfer.options import WindowOptions
 from support.iso_value_family import dice
 
-WINDOW = WindowOptions(1.0, 99.8)  # the preset mri's
+WINDOW = WindowOptions(1.0, 99.8)  # window of the preset mri
 
 
 def main(images: str | None) -> None:

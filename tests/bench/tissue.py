@@ -1,6 +1,7 @@
-"""Dice of the tissue classes on the head phantom, ours against multi-Otsu on the same voxels.
+"""Compare Dice of the tissue classes on the head phantom with multi-Otsu on the same voxels.
 
-Nothing was tuned on the rows below the first three: other seeds, shapes, noises and biases.
+Parameters were tuned on the first three rows only. The other rows have other seeds, shapes, noises
+and biases.
 """
 
 import time
@@ -27,7 +28,7 @@ CASES = (
 
 
 def dice(found: NDArray[np.bool_], truth: NDArray[np.bool_]) -> float:
-    """Return twice the voxels in both over the voxels in each."""
+    """Return the Dice coefficient: twice the intersection over the sum of both sizes."""
     return float(2 * (found & truth).sum() / (found.sum() + truth.sum()))
 
 

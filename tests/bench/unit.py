@@ -1,12 +1,15 @@
-"""What `make bench-unit` prints: a whole unit, and meshes of the same solids by other programs.
+"""Print the tables of `make bench-unit`: a whole unit, and other programs' meshes of its solids.
 
-Ours: the whole unit (8-bit volume, four sound levels, distances, occlusion) from voxels, and the
-first paper's part alone (iso-surface, filter, closed wrap, simplification). Peers: the paper's
-chain (seedchain.cpp, CGAL), VTK's FlyingEdges with pyvista's decimation and gltfpack, and zmesh
-(which igneous meshes with) on the same solids as labels; those that aren't installed are skipped by
-a line. All start from the smoothed volume but the whole unit, in one process, by turns, medians of
---rounds. Peers are asked for as many faces as our part has; of the unit lod0 is measured, which is
-finer. Bytes are those of our .glb encoder, and gltfpack's own where it is in the row's name.
+Our rows are the whole unit from voxels (8-bit volume, four sound levels, distances, occlusion), and
+only the part that the first paper describes (iso-surface, filter, closed wrap, simplification).
+Other rows are the paper's chain (seedchain.cpp, CGAL), VTK's FlyingEdges with pyvista's decimation
+and gltfpack, and zmesh, the mesher of igneous, on the same solids as labels. A missing program is
+skipped with a line.
+
+All except the whole unit start from the smoothed volume. They run alternately in one process, and
+rows are medians of --rounds. Other programs must make as many faces as our part. The unit's row
+measures lod0, which is finer. Bytes are those of our .glb encoder, or of gltfpack if the row names
+it.
 """
 
 import argparse
@@ -54,13 +57,13 @@ from stereocell.planning.settings import Settings
 from stereocell.planning.unit_steps import unit_options
 from stereocell.steps.unit import UnitInput, build_unit
 
-Run = Callable[[], tuple[Mesh, float]]  # a mesh, and the seconds that it took
+Run = Callable[[], tuple[Mesh, float]]  # returns a mesh and its seconds
 ROUNDS = 3
-DECIMATED = 0.98  # most of the faces that decimation is asked to remove
+DECIMATED = 0.98  # largest share of faces that decimation may remove
 
 
 def whole_unit(volume: Volume, given: Input) -> Mesh:
-    """Return lod0 of a unit that is a tile by itself, with the settings that a build takes."""
+    """Return lod0 of a unit that is the only tile, with a build's settings."""
     settings = Settings()
     surface = settings.surface.resolved(volume.spacing_um)
     settings = replace(settings, surface=surface)
@@ -92,7 +95,7 @@ def whole_unit(volume: Volume, given: Input) -> Mesh:
 
 
 def decimated(given: Input, faces: int) -> Mesh:
-    """Return what FlyingEdges and pyvista's quadric decimation make."""
+    """Return the mesh of FlyingEdges and pyvista's quadric decimation."""
     surface = iso_surface(given)
     poly = pv.PolyData.from_regular_faces(surface.positions, surface.triangles.astype(np.int64))
     share = min(max(1 - faces / max(len(surface.triangles), 1), 0.0), DECIMATED)
@@ -106,10 +109,10 @@ def to_mesh(poly: Any) -> Mesh:
 
 
 def pack(mesh: Mesh, program: str, folder: Path) -> int:
-    """Return the bytes of what gltfpack makes of a mesh, compressed as it can best."""
+    """Return the bytes of gltfpack's file of a mesh, with its strongest compression."""
     source, packed = folder / "peer.glb", folder / "packed.glb"
     smooth = trimesh.Trimesh(mesh.positions, mesh.triangles, process=False)
-    _ = smooth.vertex_normals  # ours have normals, too
+    _ = smooth.vertex_normals  # our meshes have normals, too
     smooth.export(source, include_normals=True)
     subprocess.run([program, "-cc", "-i", source, "-o", packed], check=True, capture_output=True)
     return packed.stat().st_size
@@ -133,7 +136,7 @@ def label_meshes(zmesh: Any, given: Input, faces: int) -> Mesh:
 
 
 def timed(make: Callable[[], Mesh]) -> Run:
-    """Return a run that is measured from outside."""
+    """Return a run whose time is measured here."""
 
     def run() -> tuple[Mesh, float]:
         start = time.perf_counter()
@@ -146,7 +149,7 @@ def timed(make: Callable[[], Mesh]) -> Run:
 def runs_of(
     volume: Volume, given: Input, binary: Path | None, folder: Path, sizes: dict[str, int]
 ) -> dict[str, Run]:
-    """Return what is compared, by name. Rows that make files of their own put them into `sizes`."""
+    """Return the runs by name. Rows that write their own files put the bytes into `sizes`."""
     runs = {
         "ours, whole unit": timed(lambda: whole_unit(volume, given)),
         "ours, paper's part": timed(lambda: wrap(given)),
@@ -181,7 +184,7 @@ def runs_of(
 
 
 def find_gltfpack() -> str | None:
-    """Return the program, from the folder that GLTFPACK names, or from PATH."""
+    """Return gltfpack from the folder that GLTFPACK names, or from PATH."""
     return shutil.which("gltfpack", path=os.environ.get("GLTFPACK")) or shutil.which("gltfpack")
 
 
@@ -196,9 +199,9 @@ def size_of(mesh: Mesh) -> int:
 def compare(
     name: str, given: Input, runs: dict[str, Run], rounds: int, sizes: dict[str, int]
 ) -> None:
-    """Print a row for each: seconds, faces, bytes, distances both ways, faults.
+    """Print a row for each run: seconds, faces, bytes, distances in both directions, faults.
 
-    sizes  bytes of the rows that make files of their own
+    sizes  bytes of the rows that write their own files
     """
     seconds: dict[str, list[float]] = {label: [] for label in runs}
     meshes: dict[str, Mesh] = {}

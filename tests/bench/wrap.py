@@ -1,9 +1,9 @@
-"""What `make bench-wrap` prints: closing on voxels against the first paper's chain on triangles.
+"""Print the table of `make bench-wrap`: closing on voxels, and the paper's chain on triangles.
 
-From the smoothed volume to a closed mesh, in one run and one process each, medians of ROUNDS; files
-that the other chain reads and writes are not counted. Both keep the same components (the paper's
-rule), bridge gaps of ALPHA and stay OFFSET away. The other chain is seedchain.cpp, beside this file
-(CGAL: components, hole filling, alpha wrap), built here.
+Both go from the smoothed volume to a closed mesh, each in one process; rows are medians of ROUNDS.
+The time that the other chain needs for files is not counted. Both keep the same components by the
+first paper's rule, bridge gaps of ALPHA and stay OFFSET away. The other chain is seedchain.cpp in
+this folder (CGAL: components, hole filling, alpha wrap), which is built here.
 """
 
 import argparse
@@ -42,7 +42,7 @@ from stereocell.samples.microscope import SPACING_UM, STAINS, record
 ROUNDS = 5
 SHAPE = (194, 512, 512)
 ALPHA = 7.2  # finest spacings: 1 um on the phantoms
-OFFSET = 0.1  # of alpha
+OFFSET = 0.1  # share of alpha
 SAMPLES = 20_000
 
 Triple = tuple[float, float, float]
@@ -54,19 +54,19 @@ class Input:
     field: NDArray[np.float32]  # smoothed, above its background
     spacing: Triple
     iso: float
-    # of alpha, both so that faces are no more, and means and 95th percentiles no larger
-    grid: float  # the coarsest spacing that voxels may get by leaving some out
-    error: float  # of simplification
+    # Shares of alpha, chosen so that our mesh has no more faces and no larger distances.
+    grid: float  # coarsest spacing of voxels, of which some may be left out
+    error: float  # error of simplification
 
 
 def inputs() -> Iterator[Input]:
-    """Yield what is wrapped, one after another."""
+    """Yield the inputs one after another."""
     for name, volume, grid, error in volumes(SHAPE):
         yield prepare(name, volume, grid, error)
 
 
 def volumes(shape: tuple[int, int, int]) -> Iterator[tuple[str, Volume, float, float]]:
-    """Yield names and voxels, with grid and error as of `Input`."""
+    """Yield names and voxels, with the `grid` and `error` of `Input`."""
     size = tuple(n * h for n, h in zip(shape, SPACING_UM, strict=True))
     for name, stain, seed, grid, error in (
         ("nuclei, seed 0", 0, 0, 0.42, 0.1),
@@ -89,13 +89,13 @@ def volumes(shape: tuple[int, int, int]) -> Iterator[tuple[str, Volume, float, f
 
 
 def prepare(name: str, volume: Volume, grid: float, error: float) -> Input:
-    """Return a volume as the pipeline smooths it, and the iso-value that it finds."""
+    """Return a volume smoothed by the pipeline, and the iso-value that the pipeline finds."""
     found = find_array_levels(volume)
     return Input(name, found.field, volume.spacing_um, found.levels.clear[0].value, grid, error)
 
 
 def wrap(given: Input) -> Mesh:
-    """Return the closed mesh of the solids that the rule keeps, as this project makes it."""
+    """Return this project's closed mesh of the solids that the rule keeps."""
     alpha = ALPHA * min(given.spacing)
     step = [max(1, int(given.grid * alpha / h + 0.01)) for h in given.spacing]
     z, y, x = (h * k for h, k in zip(given.spacing, step, strict=True))
@@ -120,16 +120,16 @@ def wrap(given: Input) -> Mesh:
 
 
 def iso_surface(given: Input) -> Mesh:
-    """Return the iso-surface of the smoothed volume as it is."""
+    """Return the unchanged iso-surface of the smoothed volume."""
     whole = Box((0, 0, 0), given.field.shape)
     height = given.field - np.float32(given.iso)
-    # values by the clip that extraction expects: only their signs and ratios matter
+    # Values are clipped as extraction expects. Only their signs and ratios matter.
     height *= np.float32(2 * max(given.spacing)) / np.abs(height).max()
     return extract_surface(height, Lattice.of_whole(whole, given.spacing))
 
 
 def chain(binary: Path, surface: Mesh, alpha: float, folder: Path) -> tuple[Mesh, float]:
-    """Return what the paper's chain makes of the iso-surface, and the seconds that it took."""
+    """Return the paper's chain's mesh of the iso-surface, and its seconds."""
     source, target = folder / "in.ply", folder / "out.ply"
     write_ply(source, surface)
     command = [binary, source, target, str(alpha), str(OFFSET * alpha)]
@@ -162,7 +162,7 @@ def write_ply(file: Path, mesh: Mesh) -> None:
 
 
 def read_ply(file: Path) -> Mesh:
-    """Read the binary PLY that CGAL writes: doubles, triangles alone."""
+    """Read a binary PLY of CGAL, with doubles and only triangles."""
     head, _, body = file.read_bytes().partition(b"end_header\n")
     words = head.decode().split()
     counts = [int(words[i + 2]) for i, word in enumerate(words) if word == "element"]
@@ -174,7 +174,7 @@ def read_ply(file: Path) -> Mesh:
 
 
 def build_chain(folder: Path) -> Path | None:
-    """Return the compiled seedchain; None, and says why, where it can't be built."""
+    """Return the compiled seedchain; prints the reason and returns None if it can't be built."""
     compiler = shutil.which("g++")
     if compiler is None:
         print("the paper's chain is skipped: no g++ to build seedchain.cpp with")
@@ -193,7 +193,7 @@ def build_chain(folder: Path) -> Path | None:
 
 
 def compare(given: Input, binary: Path, rounds: int, folder: Path) -> None:
-    """Print a row: seconds, faces, distances, of both."""
+    """Print a row for each chain: seconds, faces, distances."""
     alpha = ALPHA * min(given.spacing)
     seconds: dict[str, list[float]] = {"ours": [], "peer": []}
     for _ in range(rounds):

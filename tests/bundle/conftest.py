@@ -8,13 +8,13 @@ from support.stages import edit_over
 
 @pytest.fixture(scope="session")
 def stage(tmp_path_factory):
-    """The two tiles' stage, to be read only."""
+    """The stage of two tiles; tests must not change it."""
     return write_tiles(tmp_path_factory.mktemp("stage"))
 
 
 @pytest.fixture(scope="session")
 def bundle(stage, tmp_path_factory):
-    """Its bundle, to be read only."""
+    """The stage's bundle; tests must not change it."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
     write(stage, out)
     return out
@@ -22,7 +22,7 @@ def bundle(stage, tmp_path_factory):
 
 @pytest.fixture
 def edit(stage, tmp_path):
-    """Write a layer over the stage and return its bundle: `edit(lambda stage: ...)`."""
+    """Return a function that writes a layer over the stage and returns the layer's bundle."""
 
     def export(change):
         path = edit_over(tmp_path / "edited.usda", stage, change)

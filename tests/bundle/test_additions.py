@@ -1,4 +1,4 @@
-"""Meshes and curves that a layer adds reach the bundle, with place, name and material."""
+"""Meshes and curves that a layer adds reach the bundle with their place, name and material."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from support.edit_cases import BRANCH, define_arrow, define_material, define_wir
 
 
 def scene_of(bundle):
-    """Return additions.glb as another library reads it: its meshes in um, by the names of nodes."""
+    """Return the meshes of additions.glb, read by another library, in um, by names of nodes."""
     scene = trimesh.load(bundle / "additions.glb")
     return {
         name: scene.geometry[geometry].copy().apply_transform(matrix).apply_scale(1e6)
@@ -134,7 +134,7 @@ def test_an_added_mesh_inside_a_tile_moves_with_it(edit):
 
 
 def test_an_added_mesh_in_a_channel_s_branch_of_a_tile_is_a_layer(edit):
-    """The branch itself is only defined by the tile's payload."""
+    """Only the tile's payload defines the branch."""
     path = f"{BRANCH}/Arrow"
     bundle = edit(lambda stage: define_arrow(stage, path))
     assert edit.told == []
@@ -142,8 +142,8 @@ def test_an_added_mesh_in_a_channel_s_branch_of_a_tile_is_a_layer(edit):
 
 
 @pytest.mark.parametrize("arc", ["payload", "reference", "instance"])
-def test_what_another_file_brings_is_taken_over(edit, tmp_path, arc):
-    """A mesh, a camera and a light of a file that stands turned and moved in the specimen."""
+def test_content_of_another_file_is_taken_over(edit, tmp_path, arc):
+    """A turned and moved file in the specimen brings a mesh, a camera and a light."""
     kit = Usd.Stage.CreateNew(str(tmp_path / "kit.usda"))
     UsdGeom.SetStageUpAxis(kit, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(kit, 1e-6)
@@ -196,7 +196,7 @@ def test_an_edit_in_a_payload_of_the_layer_is_reported(edit, tmp_path):
 
 @pytest.mark.parametrize("scheme", ["none", "catmullClark"])
 def test_a_polygonal_box_without_normals_has_sharp_edges(edit, scheme):
-    """Storm shades it so; without a scheme a mesh is a cage of a smooth surface."""
+    """Storm shades such a box so. Without a scheme, a mesh is the cage of a smooth surface."""
     box = trimesh.creation.box((4, 4, 4))
 
     def change(stage):
@@ -227,7 +227,7 @@ def test_prototypes_of_an_instancer_are_not_drawn_where_they_are_defined(edit):
 
 
 def test_the_usdz_has_an_added_mesh_beside_the_specimen(stage, edit):
-    """Its place among the specimen's meshes is that of the stage, by USD's own boxes."""
+    """By USD's own boxes, its place among the specimen's meshes is the same as in the stage."""
     bundle = edit(define_arrow)
     purposes = [UsdGeom.Tokens.default_]
     small = Usd.Stage.Open(str(bundle / "specimen.usdz"))
@@ -249,7 +249,7 @@ def test_the_usdz_has_an_added_mesh_beside_the_specimen(stage, edit):
     assert tuple(surface.GetInput("diffuseColor").Get()) == (0, 0, 1)
 
 
-def test_the_subdivision_that_usd_takes_for_granted_is_named(edit):
+def test_usds_default_subdivision_is_named(edit):
     def change(stage):
         define_arrow(stage).GetPrim().RemoveProperty("subdivisionScheme")
 

@@ -1,4 +1,4 @@
-"""Each edit of the table is taken over, refused or reported: none is lost without a word."""
+"""Each edit of the table is taken over, refused or reported. No edit is lost silently."""
 
 from collections import Counter
 from pathlib import Path
@@ -11,7 +11,7 @@ from support.edit_cases import CASES, markdown
 
 
 @pytest.mark.parametrize("case", [pytest.param(case, id=case.what) for case in CASES])
-def test_an_edit_is_taken_refused_or_reported(bundle, edit, case):
+def test_edit_is_taken_over_refused_or_reported(bundle, edit, case):
     if case.outcome == "refused":
         with pytest.raises(StageError, match=case.words.replace(".", r"\.")):
             edit(case.change)
@@ -31,6 +31,6 @@ def test_the_docs_have_the_table():
     assert "\n".join(markdown()) in page.read_text("utf-8")
 
 
-def test_no_edit_has_two_rows_and_each_outcome_has_some():
+def test_edits_have_one_row_each_and_every_outcome_occurs():
     assert len({case.what for case in CASES}) == len(CASES)
     assert set(Counter(case.outcome for case in CASES)) == {"taken", "refused", "reported"}

@@ -1,4 +1,4 @@
-"""Meshes that are edited by hand over the stage: their levels are made again, or named."""
+"""Levels of meshes that are edited by hand over the stage are made again, or named."""
 
 import shutil
 from dataclasses import replace
@@ -22,7 +22,7 @@ MESH = "/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0"
 
 
 def in_level(stage, level, change):
-    """Change the mesh of r0_c0 inside one variant, which stays unselected."""
+    """Change the mesh of r0_c0 inside one variant, without selecting the variant."""
     variants = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0").GetVariantSet("lod")
     variants.SetVariantSelection(level)
     with variants.GetVariantEditContext():
@@ -40,17 +40,17 @@ def swell(factor):
     return lambda mesh: set_points(mesh, lambda p: spheres.CENTER + factor * (p - spheres.CENTER))
 
 
-RISE = 1.1 * 0.5  # um, lod2's error: so far outside its vertices may lie, to keep the volume
+RISE = 1.1 * 0.5  # um, lod2's error; vertices may lie so far outside to keep the volume
 
 
 def radii(bundle, level, shift_um=(0, 0, 0)):
-    """Return how far the vertices of r0_c0 are from the sphere's centre, um."""
+    """Return the distances, um, of the vertices of r0_c0 from the sphere's centre."""
     points = decoded_positions_m((bundle / f"channels/CD31/r0_c0/{level}.glb").read_bytes())
     return np.linalg.norm(points * 1e6 - shift_um - spheres.CENTER, axis=1)
 
 
 def errors_um(bundle):
-    """Return what the tileset states of r0_c0 by level."""
+    """Return the errors that the tileset states for r0_c0, um, by level."""
     found, waiting = {}, [load(bundle / channel(bundle)["tileset"]["path"])["root"]]
     while waiting:
         entry = waiting.pop()
@@ -82,14 +82,14 @@ def test_a_stage_without_hashes_or_edits_gives_the_same_bundle(bundle, stage, ed
 
 
 @pytest.mark.slow
-def test_coarser_levels_are_made_anew_of_an_edited_finest_one(bundle, edit):
+def test_coarser_levels_are_made_again_from_an_edited_finest_level(bundle, edit):
     edited = edit(lambda s: in_level(s, "lod0", swell(1.25)))
     large = 1.25 * spheres.RADIUS
     assert np.abs(radii(edited, "lod0") - large).max() < 0.01
     for level in ("lod1", "lod2"):
         assert np.abs(radii(edited, level) - large).max() < RISE
     stated = errors_um(edited)
-    # chords of the finest level are within .3 um of the sphere, which all of these now approach
+    # Chords of the finest level are within .3 um of the sphere, which all levels now approximate.
     assert 0 == stated["lod0"] < stated["lod1"] <= stated["lod2"] < 1
     assert stated["lod1"] != errors_um(bundle)["lod1"]
     other = "channels/CD31/r0_c1/lod1.glb"
@@ -98,7 +98,7 @@ def test_coarser_levels_are_made_anew_of_an_edited_finest_one(bundle, edit):
     assert "lod2 within" in line
     assert read((edited / other).read_bytes())[0]["meshes"]  # the neighbour is not touched
     assert chain(edited, "r0_c1") == chain(bundle, "r0_c1")
-    # by the settings of a stage that states none
+    # The stage states no settings, so defaults apply.
     document, _ = read((edited / "channels/CD31/r0_c0/lod1.glb").read_bytes())
     (primitive,) = document["meshes"][0]["primitives"]
     assert "TEXCOORD_0" not in primitive["attributes"]
@@ -106,7 +106,7 @@ def test_coarser_levels_are_made_anew_of_an_edited_finest_one(bundle, edit):
 
 
 @pytest.mark.slow
-def test_the_cut_of_levels_made_anew_is_the_edited_one(edit):
+def test_remade_levels_have_the_cut_of_the_edited_level(edit):
     edited = edit(lambda s: in_level(s, "lod0", swell(1.25)))
     cut = {}
     for level in ("lod0", "lod1"):
@@ -131,7 +131,7 @@ def test_an_edited_coarser_level_stays_and_states_its_distance(bundle, edit):
     assert line.endswith(" um from lod0, which is as it was built")
 
 
-def test_levels_that_the_artist_edited_too_stay(edit):
+def test_other_levels_that_the_artist_edited_stay(edit):
     def change(stage):
         in_level(stage, "lod0", swell(1.25))
         in_level(stage, "lod2", swell(1.5))
@@ -145,7 +145,7 @@ def test_levels_that_the_artist_edited_too_stay(edit):
 
 
 def box_mesh(mesh):
-    """Give a mesh another topology: an octahedron."""
+    """Replace a mesh by an octahedron, which has another topology."""
     points = spheres.CENTER - (2.0, 0, 0) + 1.5 * np.array(
         [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
     )  # fmt: skip
@@ -170,13 +170,13 @@ def test_another_topology_reaches_all_levels(edit, place):
         data = (edited / f"channels/CD31/r0_c0/{level}").read_bytes()
         places = decoded_positions_m(data) * 1e6 - away
         assert np.abs(np.abs(places).sum(axis=1) - 1.5).max() < 0.05
-    assert channel(edited)["triangles"][0] > 8  # and the neighbour's
+    assert channel(edited)["triangles"][0] > 8  # includes the neighbour's triangles
     (line,) = edit.told
     assert "lod0 (sound)" in line
 
 
 @pytest.mark.slow
-def test_faults_of_an_edited_mesh_are_told(edit):
+def test_faults_of_an_edited_mesh_are_reported(edit):
     def open_it(mesh):
         mesh.GetFaceVertexCountsAttr().Set(list(mesh.GetFaceVertexCountsAttr().Get())[:-40])
         mesh.GetFaceVertexIndicesAttr().Set(list(mesh.GetFaceVertexIndicesAttr().Get())[:-120])
@@ -211,7 +211,7 @@ def empty(mesh):
         ("lod0", lambda mesh: mesh.GetPrim().SetActive(False), ["lod2.glb", "lod1.glb"], []),
     ],
 )
-def test_a_level_that_is_emptied_or_switched_off_is_left_out(edit, level, change, left, told):
+def test_emptied_or_inactive_level_is_left_out(edit, level, change, left, told):
     edited = edit(lambda s: in_level(s, level, change))
     if left:
         assert chain(edited, "r0_c0") == left
@@ -241,7 +241,7 @@ def test_a_transform_of_the_finest_level_alone_is_an_edit(edit):
 
 
 @pytest.mark.slow
-def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
+def test_edit_in_place_and_flattened_edit_are_recognised(stage, edit, tmp_path):
     shutil.copytree(stage.parent, tmp_path / "own")
     own = Usd.Stage.Open(str(tmp_path / "own/tiles/r0_c0/tile.usdc"))
     variants = own.GetDefaultPrim().GetVariantSet("lod")
@@ -265,7 +265,7 @@ def test_an_edit_in_place_and_a_flattened_one_are_known(stage, edit, tmp_path):
     assert told[1:] == ["r0_c0/CD31: edited by hand: lod0 (sound)"]
 
 
-def test_points_in_other_units_are_told(stage, tmp_path):
+def test_points_in_other_units_are_reported(stage, tmp_path):
     layer = Sdf.Layer.CreateNew(str(tmp_path / "an artist's.usda"))
     layer.subLayerPaths = [str(stage)]
     over = Usd.Stage.Open(layer)
@@ -283,7 +283,7 @@ def test_points_in_other_units_are_told(stage, tmp_path):
     assert "points of an artist's.usda, whose metersPerUnit is 0.01, are taken as um" in line
 
 
-def test_points_that_are_no_numbers_are_refused(edit):
+def test_points_that_are_not_numbers_are_refused(edit):
     def spoil(mesh):
         set_points(mesh, lambda points: np.where(points > 9.9, np.nan, points))
 
@@ -293,8 +293,8 @@ def test_points_that_are_no_numbers_are_refused(edit):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("first_lod", [1, 2])
-def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, first_lod):
-    """By the stage's own settings: lod1 has maps, or values at its vertices."""
+def test_remade_levels_have_occlusion_and_paint_of_the_edited_level(tmp_path, first_lod):
+    """By the stage's settings, lod1 has maps, or values at its vertices."""
     tile = spheres.tile(0)
     (painted, *others) = tile.channels
     lods = []
@@ -333,7 +333,8 @@ def test_levels_made_anew_wear_occlusion_and_paint_of_the_edited_one(tmp_path, f
     else:
         assert lod.images is None
         color, openness = lod.mesh.colors, lod.mesh.openness
-    for share in (color[..., 0], color[..., 1]):  # half is red, half green, sharply
+    # One half is red, the other green, with a sharp border.
+    for share in (color[..., 0], color[..., 1]):
         assert 0.3 < (share > 0.9).mean() < 0.7
     assert 0.3 < (np.abs(openness - 128 / 255) < 0.02).mean() < 0.7
     assert 0.3 < (openness > 0.98).mean() < 0.7

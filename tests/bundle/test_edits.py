@@ -1,4 +1,4 @@
-"""What is edited in a layer over the stage reaches the bundle, or is named."""
+"""Edits in a layer over the stage reach the bundle, or are named."""
 
 import shutil
 from dataclasses import replace
@@ -45,7 +45,7 @@ def texels(data):
 
 @pytest.mark.slow
 def test_window_edited_over_the_stage_reaches_manifest_voxels_and_bricks(bundle, edit):
-    low, high = 490.0, 2050.0  # as source values: an eighth and a half of the old window
+    low, high = 490.0, 2050.0  # source values at an eighth and a half of the old window
     edited = edit(put(f"{CD31}.stereocell:window", Gf.Vec2f(low, high)))
     entry = channel(edited)
     assert entry["window"] == [low, high]
@@ -56,7 +56,7 @@ def test_window_edited_over_the_stage_reaches_manifest_voxels_and_bricks(bundle,
             texels((folder / volumes(folder)[0][key]["path"]).read_bytes()).astype(float)
             for folder in (bundle, edited)
         )
-        values = 100 + old / 255 * 3900  # what the voxels were in the source
+        values = 100 + old / 255 * 3900  # values of the voxels in the source
         assert np.abs(new - np.clip((values - low) / (high - low), 0, 1) * 255).max() <= 0.5001
         assert new.max() == 255
     blue = "Hoechst 33342"
@@ -65,13 +65,13 @@ def test_window_edited_over_the_stage_reaches_manifest_voxels_and_bricks(bundle,
 
 @pytest.fixture(scope="module")
 def measured_stage(tmp_path_factory):
-    """The two tiles' stage with CD31 as measured, to be read only."""
+    """The stage of two tiles with CD31 as measured; tests must not change it."""
     tiles = tuple(spheres.tile(column, measured=True) for column in (0, 1))
     return write_tiles(tmp_path_factory.mktemp("measured"), tiles)
 
 
 def edited_over(stage, folder, window):
-    """Return the bundle of a layer over a stage that sets the window of CD31."""
+    """Return the bundle of a layer that sets the window of CD31 over a stage."""
     change = put(f"{CD31}.stereocell:window", Gf.Vec2f(*window))
     write(edit_over(folder / "window.usda", stage, change), folder / "bundle")
     return folder / "bundle"
@@ -87,7 +87,7 @@ def test_a_window_edited_over_measured_voxels_loses_nothing(measured_stage, tmp_
         wanted = np.rint(np.clip((kept - low) / (high - low), 0, 1) * 255)
         data = (edited / entry["file"]["path"]).read_bytes()
         np.testing.assert_array_equal(texels(data).reshape(wanted.shape), wanted)
-    if window == (1200, 1230):  # of which 8 bits of 3900 counts have three
+    if window == (1200, 1230):  # 8 bits over 3900 counts have only three values there
         assert len(np.unique(texels(data))) > 20
 
 
@@ -153,8 +153,8 @@ def test_points_edited_outside_the_variants_are_named_with_the_remedy(edit):
         edit(change)
 
 
-def test_what_moves_over_time_is_refused_and_named(edit):
-    """As a frame of an animation has it, which other programs show."""
+def test_values_over_time_are_refused_and_named(edit):
+    """Other programs would show such values as a frame of an animation."""
 
     def points(stage):
         mesh = stage.GetAttributeAtPath("/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0.points")
@@ -184,7 +184,7 @@ def test_color_of_one_tile_stays_in_that_tile(edit):
 
 
 def drawn(bundle, tile="r0_c0"):
-    """Return the material of a tile's finest surface, as glTF has it."""
+    """Return the glTF material of a tile's finest surface."""
     return read((bundle / f"channels/CD31/{tile}/lod0.glb").read_bytes())[0]["materials"][0]
 
 
@@ -232,7 +232,7 @@ def test_emission_reaches_the_surfaces_and_one_outside_its_range_is_refused(edit
         edit(lambda s: put_new(s, f"{CD31}/surface", name, "Color3f", Gf.Vec3f(0, 5, 0)))
 
 
-def test_display_color_of_a_mesh_or_a_tile_is_its_surface_s(edit):
+def test_display_color_of_a_mesh_or_a_tile_colours_its_surface(edit):
     green, blue = Gf.Vec3f(0, 1, 0), Gf.Vec3f(0, 0, 1)
     mesh = "/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0"
 
@@ -264,12 +264,12 @@ def test_display_colors_at_points_are_those_of_the_vertices(edit):
 
 
 def put_new(stage, path, name, kind, value):
-    """Set an attribute that a prim of the stage may lack."""
+    """Return an edit that sets an attribute, which it creates if the prim lacks it."""
     stage.OverridePrim(path).CreateAttribute(name, getattr(Sdf.ValueTypeNames, kind)).Set(value)
 
 
 def bind(stage, where, *, strength="strongerThanDescendants", purpose=""):
-    """Bind a green material on a prim; an empty `where` leaves it unbound."""
+    """Bind a green material to a prim; an empty `where` leaves it unbound."""
     material = UsdShade.Material.Define(stage, "/Specimen/Mine")
     shader = UsdShade.Shader.Define(stage, "/Specimen/Mine/surface")
     shader.CreateIdAttr("UsdPreviewSurface")
@@ -282,7 +282,7 @@ def bind(stage, where, *, strength="strongerThanDescendants", purpose=""):
 
 
 @pytest.mark.parametrize("where", ["/Specimen", "/Specimen/Tiles", "/Specimen/Tiles/r0_c1"])
-def test_a_material_bound_above_the_channels_is_taken_for_surfaces_and_named(edit, where):
+def test_material_bound_above_the_channels_colours_surfaces_and_is_named(edit, where):
     edited = edit(lambda s: bind(s, where))
     (told,) = edit.told
     assert told.startswith(f"material /Specimen/Mine, bound on {where}, is taken over for surfaces")
@@ -322,7 +322,7 @@ def test_moved_tile_moves_its_boxes_meshes_and_volumes(bundle, edit):
     assert manifest["specimen"]["bounds_um"] == {"min": [0, -9.5, 0], "max": [119.5, 20, 11]}
     still, moved = volumes(edited)
     assert still["matrix"] == np.eye(4).ravel().tolist()
-    assert moved["matrix"][12:] == [100, 20, 3, 1]  # column-major: the last column
+    assert moved["matrix"][12:] == [100, 20, 3, 1]  # the last column of a column-major matrix
     assert moved["bounds_um"] == volumes(bundle)[1]["bounds_um"]
 
     box, old = (
@@ -337,7 +337,7 @@ def test_moved_tile_moves_its_boxes_meshes_and_volumes(bundle, edit):
     assert np.abs(away - spheres.RADIUS).max() < 0.01
 
 
-def test_transfer_function_chosen_and_edited_over_the_stage_is_taken(edit):
+def test_transfer_function_chosen_and_edited_over_the_stage_is_taken_over(edit):
     def change(stage):
         variants = stage.GetPrimAtPath(CD31).GetVariantSet("transferFunction")
         variants.SetVariantSelection("sharp")
@@ -364,7 +364,7 @@ def test_hidden_tiles_and_meshes_are_left_out(edit):
     assert volumes(edited) == []
 
 
-def test_edited_points_are_taken(edit):
+def test_edited_points_are_taken_over(edit):
     def change(stage):
         tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
         for level in range(3):
@@ -373,7 +373,7 @@ def test_edited_points_are_taken(edit):
             with variants.GetVariantEditContext():
                 points = stage.GetAttributeAtPath(f"{tile.GetPath()}/CD31/CD31_r0_c0.points")
                 points.Set([point + Gf.Vec3f(0, 0, 1) for point in points.Get()])
-        variants.ClearVariantSelection()  # to edit a level isn't to choose it
+        variants.ClearVariantSelection()  # editing a level does not select it
 
     points = decoded_positions_m((edit(change) / "channels/CD31/r0_c0/lod1.glb").read_bytes())
     away = np.linalg.norm(points * 1e6 - (0, 0, 1) - spheres.CENTER, axis=1)
@@ -381,13 +381,13 @@ def test_edited_points_are_taken(edit):
 
 
 @pytest.mark.parametrize("chosen", ["mesh", "volume", "both"])
-def test_representation_chosen_for_a_tile_reaches_the_manifest_and_takes_nothing_away(
+def test_representation_chosen_for_a_tile_reaches_the_manifest_and_removes_nothing(
     bundle, edit, chosen
 ):
     edited = edit(lambda s: choose(s, "r0_c1", representation=chosen))
     found = [tile["representation"] for tile in load(edited / "manifest.json")["tiles"]]
     assert found == ["mesh", chosen]
-    for name in ("CD31", "Hoechst 33342"):  # its other form stays for the viewer's user
+    for name in ("CD31", "Hoechst 33342"):  # the other form remains available in the viewer
         assert channel(edited, name) == channel(bundle, name)
 
 
@@ -416,18 +416,18 @@ def test_coarse_lod_chosen_for_a_tile_is_the_finest_that_the_bundle_has(bundle, 
     assert chain(edited, "r0_c1") == ["lod2.glb"]
     assert [p.name for p in (edited / "channels/CD31/r0_c1").iterdir()] == ["lod2.glb"]
     kept = "channels/CD31/r0_c1/lod2.glb"
-    # the only level wears its maps, which the coarsest of several leaves out
+    # A single level keeps its maps. The coarsest of several levels has none.
     assert "images" in read((edited / kept).read_bytes())[0]
     assert "images" not in read((bundle / kept).read_bytes())[0]
     assert not [path for path in load(edited / "files.json") if "r0_c1/lod0" in path]
-    # two tiles alike: half of each level is the other one's
+    # The tiles are alike, so each has half of a level's triangles.
     two = channel(bundle)["triangles"]
     assert channel(edited)["triangles"] == [n // 2 + two[2] // 2 for n in two]
     assert volumes(edited) == volumes(bundle)
 
 
 @pytest.mark.slow
-def test_triangles_are_told_by_the_stage_s_levels_whatever_is_left_out(tmp_path, monkeypatch):
+def test_triangles_are_counted_by_the_levels_of_the_stage(tmp_path, monkeypatch):
     monkeypatch.setattr(spheres, "LEVELS", (*spheres.LEVELS, (6, 0.6)))
     tiles = [spheres.tile(0), spheres.tile(1)]
     stage = Usd.Stage.Open(str(write_tiles(tmp_path, tiles)))
@@ -443,7 +443,7 @@ def test_triangles_are_told_by_the_stage_s_levels_whatever_is_left_out(tmp_path,
 
 
 @pytest.mark.parametrize("level", ["lod0", "lod1"])
-def test_lod_that_is_fine_enough_to_work_with_leaves_all_levels(bundle, edit, level):
+def test_choosing_lod0_or_lod1_keeps_all_levels(bundle, edit, level):
     edited = edit(lambda s: choose(s, "r0_c1", lod=level))
     assert channel(edited) == channel(bundle)
 

@@ -1,4 +1,4 @@
-"""Lights of a layer over the stage reach the bundle: lamps, and the light of domes around them."""
+"""Lights of a layer over the stage reach the bundle as lamps, and as the light of domes."""
 
 import imagecodecs
 import numpy as np
@@ -11,7 +11,7 @@ from stereocell.model.errors import StageError
 from support.bundles import load
 
 LIGHTS = "/Specimen/Lights"
-MIDDLE = np.array([10.0, -5, 4])  # of the two tiles, um
+MIDDLE = np.array([10.0, -5, 4])  # um, middle of the two tiles
 
 
 def lights_of(bundle):
@@ -28,8 +28,10 @@ def remove_built(stage):
 
 
 def latlong(towards, color, rows=32):
-    """Return an image (rows, 2 rows, 3) that is black but for a disc of 0.2 radians, as OpenEXR's
-    documentation has it: longitude +pi at the left, 0 is +z, pi / 2 is +x."""
+    """Return an image (rows, 2 rows, 3) that is black except for a disc of 0.2 radians.
+
+    By OpenEXR's documentation, longitude is +pi at the left; 0 is +z, and pi / 2 is +x.
+    """
     latitude = np.pi / 2 - (np.arange(rows) + 0.5)[:, None] / rows * np.pi
     longitude = np.pi - (np.arange(2 * rows) + 0.5)[None, :] / rows * np.pi
     x, z = np.cos(latitude) * np.sin(longitude), np.cos(latitude) * np.cos(longitude)
@@ -38,7 +40,7 @@ def latlong(towards, color, rows=32):
 
 
 def brightest(image):
-    """Return the direction of the brightest texel, by OpenEXR's documentation."""
+    """Return the direction of the brightest texel by OpenEXR's documentation."""
     rows, columns = image.shape[:2]
     row, column = np.unravel_index(image.sum(axis=2).argmax(), (rows, columns))
     return direction(row, column, rows, columns)
@@ -52,7 +54,7 @@ def direction(row, column, rows, columns):
 
 
 def middle_of_light(image):
-    """Return the direction that light comes from in the mean."""
+    """Return the mean direction from which light comes."""
     rows, columns = image.shape[:2]
     total = np.zeros(3)
     for row in range(rows):
@@ -62,18 +64,18 @@ def middle_of_light(image):
     return total / np.linalg.norm(total)
 
 
-def test_a_stage_that_nobody_lit_leaves_the_viewers_own_lamps(bundle):
+def test_stage_with_unedited_lights_keeps_the_viewers_own_lamps(bundle):
     assert lights_of(bundle) is None
     assert not (bundle / "room.exr").exists()
 
 
-def test_without_any_light_the_viewer_keeps_its_own_lamps_and_a_line_says_so(edit):
+def test_stage_without_lights_keeps_the_viewers_lamps_and_a_line_states_it(edit):
     bundle = edit(lambda stage: stage.GetPrimAtPath(LIGHTS).SetActive(False))
     assert lights_of(bundle) is None
     assert ["no light of its own" in line for line in edit.told] == [True]
 
 
-def test_a_distant_light_sends_on_what_usdlux_defines(edit):
+def test_distant_light_is_as_bright_as_usdlux_defines(edit):
     def change(stage):
         remove_built(stage)
         sun = UsdLux.DistantLight.Define(stage, f"{LIGHTS}/Sun")
@@ -86,7 +88,7 @@ def test_a_distant_light_sends_on_what_usdlux_defines(edit):
     found = lights_of(edit(change))
     assert edit.told == []
     (lamp,) = found["lamps"]
-    # radiance over the cone of one degree, weighed by the cosine; a white surface sends on 1 / pi
+    # Radiance over the cone of one degree, weighted by the cosine; white reflects 1 / pi of it.
     angle = np.linspace(0, np.radians(1), 20001)
     cone = np.trapezoid(np.cos(angle) * np.sin(angle), angle) * 2 * np.pi
     assert lamp["strength"] == pytest.approx(2000 * cone / np.pi, rel=1e-4)
@@ -96,7 +98,7 @@ def test_a_distant_light_sends_on_what_usdlux_defines(edit):
 
 
 @pytest.mark.parametrize("is_normalized", [False, True])
-def test_a_sphere_sends_on_what_its_surface_does(edit, is_normalized):
+def test_sphere_light_is_as_bright_as_its_visible_surface(edit, is_normalized):
     at, radius = MIDDLE + np.array([0, 100.0, 0]), 3.0
 
     def change(stage):
@@ -109,7 +111,7 @@ def test_a_sphere_sends_on_what_its_surface_does(edit, is_normalized):
 
     (lamp,) = lights_of(edit(change))["lamps"]
     assert lamp["position_um"] == pytest.approx(at)
-    # by points of the sphere that the surface sees, each of the same radiance in all directions
+    # Sum over the visible points of the sphere, each with equal radiance in all directions.
     towards = np.random.default_rng(0).normal(size=(200_000, 3))
     points = at + radius * towards / np.linalg.norm(towards, axis=1)[:, None]
     ray = MIDDLE - points
@@ -122,7 +124,7 @@ def test_a_sphere_sends_on_what_its_surface_does(edit, is_normalized):
     assert lamp["strength"] == pytest.approx(irradiance / np.pi, rel=0.01)
 
 
-def test_color_temperature_counts(edit):
+def test_color_temperature_changes_the_color(edit):
     def change(stage):
         key = UsdLux.LightAPI(stage.GetPrimAtPath(f"{LIGHTS}/key"))
         key.CreateEnableColorTemperatureAttr(True)
@@ -135,7 +137,7 @@ def test_color_temperature_counts(edit):
     assert red > green > blue > 0
 
 
-def test_of_more_lamps_than_three_the_weakest_are_named(edit):
+def test_weakest_of_more_than_three_lamps_are_named(edit):
     def change(stage):
         remove_built(stage)
         for i in range(4):
@@ -157,8 +159,8 @@ def test_a_lamp_that_is_too_bright_is_named(edit):
 
 
 @pytest.mark.parametrize("turn", [None, (0, 90, 0), (40, -70, 20)])
-def test_a_turned_dome_lights_from_where_usd_turns_it(edit, tmp_path, turn):
-    """OpenEXR's documentation says where a texel is; USD's own transform turns it."""
+def test_turned_dome_shines_from_the_direction_that_usd_gives(edit, tmp_path, turn):
+    """OpenEXR's documentation defines where a texel is, and USD's own transform turns it."""
     shines_at = np.array([0.6, 0.48, 0.64])
     image = tmp_path / "lamp.hdr"
     image.write_bytes(imagecodecs.rgbe_encode(latlong(shines_at, (4.0, 2.0, 1.0))))
@@ -180,7 +182,7 @@ def test_a_turned_dome_lights_from_where_usd_turns_it(edit, tmp_path, turn):
     if turn is None:
         room = lights_of(bundle)["room"]
         share = np.array(room["sky"])
-        assert share[0] == pytest.approx(2 * (1 - np.cos(0.2)), rel=0.1)  # of the upper half
+        assert share[0] == pytest.approx(2 * (1 - np.cos(0.2)), rel=0.1)  # share of the upper half
         assert share == pytest.approx(share[0] * np.array([1, 0.5, 0.25]), rel=0.01)
         assert room["ground"] == [0, 0, 0]
 

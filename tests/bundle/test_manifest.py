@@ -1,4 +1,4 @@
-"""The manifest of a bundle: it names its source, and no command reads it once it was changed."""
+"""The manifest of a bundle names its source, and commands refuse it after a change."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def _state(layer_file: Path, fingerprint: object) -> None:
 
 
 def _over(stage: Path, place: Path) -> Path:
-    """Write a layer of an artist over a stage, which states no source."""
+    """Write an artist's layer over a stage; the layer states no source."""
     place.write_text(f"{HEAD}subLayers = [@{stage}@]\n)\n")
     return place
 
@@ -49,7 +49,7 @@ def test_manifest_states_the_fingerprint_of_the_source_below_all_layers(
         assert _fingerprint(over, tmp_path / "bundle") == expected
     _state(stage, FIRST)
     over = _over(stage, tmp_path / "two.usda")
-    _state(over, SECOND)  # composed of two builds: it is neither
+    _state(over, SECOND)  # a composition of two builds belongs to neither
     both = _fingerprint(over, tmp_path / "bundle")
     assert len(both) == 64
     assert both not in (FIRST, SECOND)
@@ -57,7 +57,7 @@ def test_manifest_states_the_fingerprint_of_the_source_below_all_layers(
 
 
 @pytest.mark.parametrize("seal", ["changed", "missing"])
-def test_manifest_that_was_changed_is_read_by_no_command(
+def test_changed_manifest_is_refused_by_every_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], seal: str
 ) -> None:
     plain_bundle.write(tmp_path, plain_bundle.FILES)

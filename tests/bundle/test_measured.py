@@ -1,4 +1,4 @@
-"""Voxels as measured, from a source to a bundle: what an artist's window finds in the stage."""
+"""The stage keeps voxels as measured, so an artist's window loses no values in the bundle."""
 
 import json
 from pathlib import Path
@@ -15,11 +15,11 @@ from support.phantoms import f_phantom, write_ome_tiff
 from support.validators import make_assets
 
 SPACING_UM = (0.5, 0.25, 0.25)
-WINDOW = (-310, -290)  # within a step and a half of those that were built
+WINDOW = (-310, -290)  # as narrow as one and a half 8-bit steps of the built window
 
 
 def counts() -> NDArray[np.int16]:
-    """Return an F of 600 in noise round -300, as a CT has values below 0."""
+    """Return an F with value 600 in noise round -300; like a CT, it has values below 0."""
     noise = np.random.default_rng(4).normal(-300, 8, f_phantom().shape)
     return np.where(f_phantom() > 500, 600, np.rint(noise)).astype(np.int16)
 
@@ -64,13 +64,13 @@ def test_an_edited_window_gives_the_volumes_of_a_build_with_it(
     edited = bundle_over(built, tmp_path)
     low, high = WINDOW
     anew = build(source, tmp_path / "anew", "--window", f"F={low}:{high}") / "bundle"
-    assert len(volumes(edited)) == 4  # of two tiles, textures and bricks
+    assert len(volumes(edited)) == 4  # textures and bricks of two tiles
     assert volumes(edited) == volumes(anew)
     assert volumes(edited) != volumes(built / "bundle")
 
 
 @pytest.mark.slow
-def test_8_bits_leave_the_measured_voxels_out_and_the_log_says_their_size(
+def test_8_bits_leave_out_measured_voxels_and_the_log_states_their_size(
     built: Path, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     small = build(source, tmp_path / "small", "--bits", "8")
@@ -80,7 +80,7 @@ def test_8_bits_leave_the_measured_voxels_out_and_the_log_says_their_size(
         {path: data for path, data in files(out / "bundle").items() if path.suffix != ".json"}
         for out in (built, small)
     )
-    assert kept == alone  # and volumes.json names no file of the stage
+    assert kept == alone  # surfaces and volumes do not depend on measured voxels
     edited = bundle_over(small, tmp_path)
     assert volumes(edited) != volumes(bundle_over(built, tmp_path / "of_16"))
     build(source, tmp_path / "whole")
@@ -92,7 +92,7 @@ def test_8_bits_leave_the_measured_voxels_out_and_the_log_says_their_size(
         sum(file.stat().st_size for file in out.glob("stage/tiles/*/F.vdb"))
         for out in (built, small)
     )
-    # but for what stands before each grid: its name, its type and offsets
+    # The rest is the head of each grid: its name, type and offsets.
     assert 0 < large - bare - measured < 200
     assert f"stage: {measured / 1e6:.1f} of " in told
     assert "--bits 8 leaves them out" in told

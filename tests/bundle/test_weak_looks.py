@@ -1,7 +1,7 @@
-"""The looks of a build are weaker than any opinion over its stage: a class, a variant, a scene.
+"""A build's appearances are weaker than any edit over its stage: a class, a variant, a scene.
 
-Each way is composed by USD, where the material that a mesh is bound to must have the colour, and
-goes through a bundle, where surface and volume must have it.
+USD composes each kind of edit, and the mesh's bound material must have the colour. Then surface
+and volume of the stage's bundle must have it, too.
 """
 
 from pathlib import Path
@@ -29,7 +29,7 @@ LAYERED = {
 
 
 def colors_of(stage: Usd.Stage, root: str = "/Specimen") -> set[tuple[float, ...]]:
-    """Return the colours of a channel's surfaces, live and by volumes' materials, in all tiles."""
+    """Return the colours of a channel's surfaces and of its volumes' materials in all tiles."""
     found = set()
     for tile in _TILES:
         mesh = stage.GetPrimAtPath(f"{root}/Tiles/{tile}/CD31/CD31_{tile}")
@@ -41,7 +41,7 @@ def colors_of(stage: Usd.Stage, root: str = "/Specimen") -> set[tuple[float, ...
 
 
 @pytest.mark.parametrize("way", LAYERED)
-def test_an_opinion_over_the_stage_recolours_a_channel_and_its_bundle(edit, tmp_path, way):
+def test_edit_over_the_stage_recolours_a_channel_and_its_bundle(edit, tmp_path, way):
     bundle = edit(LAYERED[way])
     assert [line for line in edit.told if "is not taken over" in line] == []
     assert colors_of(Usd.Stage.Open(str(tmp_path / "edited.usda"))) == {GREEN}
@@ -49,7 +49,7 @@ def test_an_opinion_over_the_stage_recolours_a_channel_and_its_bundle(edit, tmp_
 
 
 def scene_over(stages: dict[str, Path], path: Path) -> Usd.Stage:
-    """Return a new scene at a path that references stages, each below /World by its name."""
+    """Return a new scene, stored at a path, that references stages as /World/NAME."""
     layer = Sdf.Layer.CreateNew(str(path))
     layer.defaultPrim = "World"
     stage = Usd.Stage.Open(layer)
@@ -70,7 +70,7 @@ def scene(tmp_path):
 
 
 def bundle_of(scene: Usd.Stage, folder: Path) -> tuple[list[str], Path]:
-    """Return the lines on the bundle of a saved scene, and the bundle."""
+    """Return the reported lines and the bundle of a saved scene."""
     scene.GetRootLayer().Save()
     return write(Path(scene.GetRootLayer().realPath), folder / "bundle"), folder / "bundle"
 
@@ -114,7 +114,7 @@ def test_a_scene_of_several_specimens_is_refused_by_their_names(scene, tmp_path)
 
 
 @pytest.mark.parametrize("arc", ["reference", "payload"])
-def test_a_specimen_has_the_name_and_the_place_that_a_scene_gives_it(tmp_path, arc):
+def test_scene_may_rename_and_move_a_specimen(tmp_path, arc):
     file = write_tiles(tmp_path / "A")
     scene = scene_over({}, tmp_path / "scene.usda")
     UsdGeom.Xformable(scene.GetPrimAtPath("/World")).AddTranslateOp().Set(Gf.Vec3d(100, 0, 0))
@@ -140,7 +140,7 @@ def test_a_specimen_has_the_name_and_the_place_that_a_scene_gives_it(tmp_path, a
 
 @pytest.mark.parametrize("path", ["/Specimen", "/__class__/Specimen"])
 def test_a_channel_that_is_hidden_at_first_stays_in_the_bundle(edit, path):
-    """Whichever arc hides it: it is not shown at first, and the panel still has it."""
+    """With any composition arc, the channel opens hidden, but stays in the panel."""
 
     def hide(stage: Usd.Stage) -> None:
         shown = stage.OverridePrim(f"{path}/Shown/CD31")

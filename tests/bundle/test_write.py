@@ -1,4 +1,4 @@
-"""The bundle of a stage: its files, their formats, and stages that can't be exported."""
+"""The bundle of a stage: its files, their formats, and stages that can't be bundled."""
 
 import hashlib
 import json
@@ -35,7 +35,7 @@ def test_manifest_and_volume_lists_fit_their_schemas(bundle):
         schema("volumes.schema.json").validate(load(bundle / entry["volumes"]["path"]))
 
 
-def test_manifest_says_what_the_stage_holds(bundle):
+def test_manifest_describes_the_content_of_the_stage(bundle):
     manifest = load(bundle / "manifest.json")
     assert manifest["specimen"]["name"] == "two tiles"
     assert manifest["specimen"]["bounds_um"] == {"min": [0, -9.5, 0], "max": [19.5, 0, 8]}
@@ -146,7 +146,7 @@ def test_meshes_lie_where_the_stage_has_them_and_meet_without_a_crack(bundle):
     assert edges[:3] == edges[3:]
 
 
-def test_coarse_lod_has_the_baked_normal_map_and_the_coarsest_is_bare(bundle):
+def test_coarse_lod_has_the_baked_normal_map_and_the_coarsest_has_no_maps(bundle):
     document, _ = read((bundle / "channels/CD31/r0_c0/lod1.glb").read_bytes())
     primitive = document["meshes"][0]["primitives"][0]
     assert {"TEXCOORD_0", "TANGENT"} <= primitive["attributes"].keys()
@@ -158,7 +158,7 @@ def test_coarse_lod_has_the_baked_normal_map_and_the_coarsest_is_bare(bundle):
 
 
 def test_coarsest_keeps_the_occlusion_of_its_map_at_its_vertices(tmp_path):
-    """Else a tile would brighten where the view goes away from it: finer levels are dark there."""
+    """Otherwise distant tiles would become brighter, because finer levels are dark there."""
     tile = spheres.tile(0)
     (red, *others) = tile.channels
     left_is_hidden = np.full((32, 32), 255, np.uint8)
@@ -173,7 +173,7 @@ def test_coarsest_keeps_the_occlusion_of_its_map_at_its_vertices(tmp_path):
     assert "images" not in document
     mesh = lods[-1].mesh
     places, where = np.unique(mesh.positions, axis=0, return_inverse=True)
-    # at the map's ends and at the poles, vertices of one place find other texels
+    # At the map's ends and at the poles, vertices at one place have different texels.
     openness = np.bincount(where.ravel(), np.where(mesh.uvs[:, 0] < 0.5, 0.2, 1.0))
     openness /= np.bincount(where.ravel())
     _, nearest = cKDTree(places).query(decoded_positions_m(data) * 1e6)
@@ -183,13 +183,13 @@ def test_coarsest_keeps_the_occlusion_of_its_map_at_its_vertices(tmp_path):
 
 
 @pytest.mark.exhaustive  # whole builds are compared by every run: tests/system/test_build.py
-def test_two_exports_are_equal_whatever_the_workers(stage, bundle, tmp_path):
+def test_bundles_are_equal_for_any_number_of_workers(stage, bundle, tmp_path):
     with closing(Engine(2)) as engine:
         write_bundle(stage, tmp_path / "again", None, engine=engine)
     assert files(tmp_path / "again") == files(bundle)
 
 
-def test_cut_volume_is_one_line(tmp_path, capfd):
+def test_truncated_volume_is_an_error_of_one_line(tmp_path, capfd):
     stage = write_tiles(tmp_path / "stage")
     atlas = tmp_path / "stage/tiles/r0_c1/CD31.exr"
     atlas.write_bytes(atlas.read_bytes()[:-50])
@@ -197,7 +197,7 @@ def test_cut_volume_is_one_line(tmp_path, capfd):
         StereoCellError, match=r"CD31\.exr: can't be read as OpenEXR: the file ends at byte"
     ):
         write(stage, tmp_path / "bundle")
-    for line in capfd.readouterr().err.splitlines():  # OpenEXR's own words would come on top
+    for line in capfd.readouterr().err.splitlines():  # OpenEXR may print lines of its own
         assert line.startswith("bundle: ")
 
 
@@ -217,7 +217,7 @@ def test_missing_file_is_named_with_its_prim(tmp_path, capfd, lost, words):
     with pytest.raises(StereoCellError, match=words) as caught:
         write(stage, tmp_path / "bundle")
     assert "\n" not in str(caught.value)
-    for line in capfd.readouterr().err.splitlines():  # USD's own warnings would come on top
+    for line in capfd.readouterr().err.splitlines():  # USD may print warnings of its own
         assert line.startswith("bundle: ")
     assert [p.name for p in tmp_path.iterdir()] == ["stage"]
 
@@ -234,7 +234,7 @@ def test_old_bundle_is_replaced_as_a_whole_and_kept_if_the_new_one_fails(stage, 
     assert [p.name for p in tmp_path.iterdir()] == ["bundle"]
 
 
-def test_folder_that_is_no_bundle_is_left_alone(stage, tmp_path):
+def test_folder_that_is_not_a_bundle_is_not_changed(stage, tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(
         OutputError, match=r"is no bundle: found something else \(thesis\.tex\), and no m"
@@ -252,7 +252,7 @@ def test_viewer_is_copied_and_listed(stage, tmp_path):
     assert {"index.html", "assets/main.js"} <= load(tmp_path / "bundle" / "files.json").keys()
 
 
-def test_the_page_of_the_inbox_is_in_no_bundle(stage, tmp_path):
+def test_bundle_has_no_page_of_the_inbox(stage, tmp_path):
     for folder in ("assets", "inbox_assets"):
         (tmp_path / "dist" / folder).mkdir(parents=True)
         (tmp_path / "dist" / folder / "main.js").write_text("start()")
@@ -265,12 +265,12 @@ def test_the_page_of_the_inbox_is_in_no_bundle(stage, tmp_path):
     assert not [name for name in (*listed, *copied) if name.startswith("inbox")]
 
 
-def test_viewer_that_is_not_built_is_named(stage, tmp_path):
+def test_missing_build_of_the_viewer_is_named(stage, tmp_path):
     with pytest.raises(OutputError, match=r"dist: found no index\.html, expected the built viewer"):
         write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", engine=Engine(0))
 
 
-def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
+def test_viewer_may_not_replace_files_of_the_bundle(stage, tmp_path):
     (tmp_path / "dist").mkdir()
     for name in ("index.html", "manifest.json"):
         (tmp_path / "dist" / name).write_text("")
@@ -280,7 +280,7 @@ def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
 
 
 @pytest.mark.parametrize("escape", ["id", "path"])
-def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path, escape):
+def test_finished_tile_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path, escape):
     parts = tmp_path / "parts"
     write_bundle(stage, tmp_path / "first", None, engine=Engine(0), parts=parts)
     (tmp_path / "secret.txt").write_text("private")
@@ -300,7 +300,7 @@ def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path
     assert (tmp_path / "secret.txt").read_text("utf-8") == "private"
 
 
-def test_a_bundle_that_goes_on_names_edited_layers_of_finished_tiles(tmp_path):
+def test_resumed_bundle_names_edited_layers_of_finished_tiles(tmp_path):
     stage, parts = write_tiles(tmp_path / "stage"), tmp_path / "parts"
     write_list(stage.parent, {}, stage.parent)
     edited = stage.parent / "tiles" / "r0_c0" / "tile.usdc"
@@ -308,7 +308,7 @@ def test_a_bundle_that_goes_on_names_edited_layers_of_finished_tiles(tmp_path):
     layer.documentation = "a long note " * 200
     layer.Save()
     told = []
-    for name in ("first", "again"):  # the second one finds the tiles of the first one finished
+    for name in ("first", "again"):  # the second bundle uses the finished tiles of the first
         told.append([])
         write_bundle(
             stage, tmp_path / name, None, engine=Engine(0), parts=parts, report_line=told[-1].append

@@ -1,4 +1,4 @@
-"""specimen.usdz in the bundle: of the composed stage, in manifest and list, or why it is not."""
+"""The bundle has specimen.usdz of the composed stage, or states why it has none."""
 
 import hashlib
 
@@ -10,7 +10,7 @@ from support.stages import edit_over
 
 
 def export(stage, folder, change=None):
-    """Write the bundle of a stage, or of a layer with a change over it; return it and its lines."""
+    """Write the bundle of a stage or of a layer with a change; return it and the reported lines."""
     path = edit_over(folder / "edited.usda", stage, change) if change else stage
     return folder / "bundle", write(path, folder / "bundle")
 
@@ -22,7 +22,7 @@ def colors_of(bundle):
     return [tuple(round(v, 3) for v in each.Get()) for each in found if each and each.Get()]
 
 
-def test_it_is_in_the_manifest_and_in_the_list(stage, tmp_path):
+def test_usdz_is_in_the_manifest_and_in_the_list(stage, tmp_path):
     bundle, lines = export(stage, tmp_path)
     content = (bundle / "specimen.usdz").read_bytes()
     entry = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
@@ -33,7 +33,7 @@ def test_it_is_in_the_manifest_and_in_the_list(stage, tmp_path):
     assert not [line for line in lines if "usdz" in line]
 
 
-def test_it_shows_an_edit_of_the_stage(stage, tmp_path):
+def test_usdz_shows_an_edit_of_the_stage(stage, tmp_path):
     plain, _ = export(stage, tmp_path / "plain")
     assert (0.1, 0.9, 0.2) not in colors_of(plain)
     (tmp_path / "edited").mkdir()
@@ -47,7 +47,7 @@ def test_it_shows_an_edit_of_the_stage(stage, tmp_path):
     assert (0.1, 0.9, 0.2) in colors_of(edited)
 
 
-def test_a_large_one_is_left_out_and_said(stage, tmp_path, monkeypatch):
+def test_large_usdz_is_left_out_and_reported(stage, tmp_path, monkeypatch):
     monkeypatch.setattr(write_ar, "MAX_USDZ_BYTES", 1000)
     bundle, lines = export(stage, tmp_path)
     assert not (bundle / "specimen.usdz").exists()
@@ -58,7 +58,7 @@ def test_a_large_one_is_left_out_and_said(stage, tmp_path, monkeypatch):
     assert lines == [f"no specimen.usdz: {manifest['usdz_reason']}"]
 
 
-def test_without_a_surface_there_is_none(stage, tmp_path):
+def test_stage_without_a_visible_surface_has_no_usdz(stage, tmp_path):
     def hide(over):
         for tile in list(over.GetPrimAtPath("/Specimen/Tiles").GetChildren()):
             tile.Load()

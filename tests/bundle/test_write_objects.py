@@ -1,4 +1,4 @@
-"""The table of a label map's objects in the bundle: each file against what numpy says of it."""
+"""The bundle's files of a label map's table agree with values that numpy computes."""
 
 import json
 from dataclasses import replace
@@ -74,7 +74,7 @@ def decoded(entry, data):
     return span["low"] + share * (span["high"] - span["low"])
 
 
-def test_bytes_span_all_but_a_thousandth_at_either_end(tmp_path):
+def test_bytes_span_values_except_a_thousandth_at_either_end(tmp_path):
     entry, data, exact = column_of(tmp_path, number("extent", NORMAL))
     assert exact.tobytes() == NORMAL.astype("<f4").tobytes()
     assert (entry["range"]["min"], entry["range"]["max"]) == (exact.min(), exact.max())
@@ -89,20 +89,20 @@ def test_bytes_span_all_but_a_thousandth_at_either_end(tmp_path):
     assert (data[exact > high] == 255).all()
 
 
-def test_what_spreads_over_decades_has_bytes_by_its_logarithm(tmp_path):
+def test_bytes_are_logarithmic_for_values_that_span_decades(tmp_path):
     entry, data, exact = column_of(tmp_path, number("CD8", LOGNORMAL))
     span = entry["range"]
     assert span["scale"] == "log"
     inside = (exact >= span["low"]) & (exact <= span["high"])
     off = np.abs(np.log(decoded(entry, data) / exact))[inside]
     assert off.max() <= 0.5 * np.log(span["high"] / span["low"]) / 254 * 1.0001
-    assert 100 < np.median(data) < 156  # a byte says something of each half
+    assert 100 < np.median(data) < 156  # bytes resolve the lower and the upper half of the values
 
 
 @pytest.mark.parametrize(
     "values", [LOGNORMAL - LOGNORMAL.min(), RNG.uniform(1, 100, COUNT), 10_000 + LOGNORMAL]
 )
-def test_zeros_even_values_and_a_narrow_span_stay_linear(tmp_path, values):
+def test_bytes_are_linear_for_zeros_uniform_values_and_narrow_spans(tmp_path, values):
     assert column_of(tmp_path, number("a", values))[0]["range"]["scale"] == "linear"
 
 
@@ -127,7 +127,7 @@ def test_equal_values_are_all_known(tmp_path):
     assert (data == 1).all()
 
 
-def test_categories_are_their_index_and_1(tmp_path):
+def test_byte_of_a_category_is_its_index_plus_1(tmp_path):
     entry, data, exact = column_of(tmp_path, TYPE)
     assert entry["kind"] == "category"
     assert entry["categories"] == ["T", "B", "tumour"]
@@ -157,7 +157,7 @@ def test_an_object_in_two_tiles_has_one_row(tmp_path):
     assert tiles["r0_c0"] == {"first": 0, "count": 3, "more": [7]}
 
 
-def test_neighbours_are_known_from_both_sides(tmp_path):
+def test_neighbours_are_listed_for_both_objects(tmp_path):
     walls = np.array([[0, 1], [1, 2], [0, 4]], np.int32)
     content = written(tmp_path, table(labels=range(1, 6), walls=walls))
     first = load(tmp_path, content["neighbours"]["first"], "<u4")
@@ -166,20 +166,20 @@ def test_neighbours_are_known_from_both_sides(tmp_path):
     assert found == [[1, 4], [0, 2], [1], [], [0]]
 
 
-def test_ids_that_differ_by_case_alone_are_two_files(tmp_path):
+def test_ids_that_differ_only_by_case_have_different_files(tmp_path):
     columns = written(tmp_path, table(number("cd8", NORMAL), number("CD8", LOGNORMAL)))["columns"]
     paths = [entry[kind]["path"].lower() for entry in columns for kind in ("bytes", "exact")]
     assert len(set(paths)) == 4
 
 
-def test_a_recolouring_of_20_000_objects_is_20_kb(tmp_path):
+def test_recolouring_20_000_objects_takes_20_kb(tmp_path):
     labels = np.arange(1, 20_001)
     column = number("CD8", RNG.lognormal(5, 1, 20_000))
     (entry,) = written(tmp_path, replace(table(labels=labels), columns=(column,)))["columns"]
     assert entry["bytes"]["bytes"] == 20_000
 
 
-def test_one_value_of_a_long_column_can_be_had_by_a_checked_range(tmp_path):
+def test_one_value_of_a_long_column_can_be_read_by_a_verified_range(tmp_path):
     (entry,) = written(tmp_path, table(number("extent", NORMAL)))["columns"]
     data = (tmp_path / entry["exact"]["path"]).read_bytes()
     assert entry["parts"] == [sha256(each).hexdigest() for each in (data[:16384], data[16384:])]

@@ -1,4 +1,4 @@
-"""Edits of a stage in files for other programs: an edit is in the file, or a line denies it."""
+"""In files for other programs, an edit of the stage is applied, or a line states that it is not."""
 
 import hashlib
 from collections.abc import Callable
@@ -14,15 +14,15 @@ from stereocell.storage.file_list import encode, list_files
 from support.edit_cases import CASES, EditCase
 from support.exhaustive import sweep
 
-# Endings of one writer have one table of edits, and turntables take long.
+# Endings of the same writer take over the same edits, and turntables take long.
 ALIKE = (".gltf", ".usda", ".mp4", ".webm", ".raw", ".nii.gz")
 TRIED = [ending for ending in FORMATS if ending not in ALIKE]
-# Hiding the only channel with a surface shows it nevertheless: else nothing would be drawn.
+# If the only channel with a surface is hidden, it is drawn nevertheless, to draw anything at all.
 ONLY_ONE = "visibility of `/Specimen/Shown/CHANNEL`"
 
 
 def write(stage: Path, folder: Path, ending: str) -> tuple[str, list[str]]:
-    """Return a digest of what was written, and the lines on edits."""
+    """Export; return a digest of the files, and the lines on edits."""
     folder.mkdir()
     lines: list[str] = []
     options = ExportOptions(width=200) if ending == ".png" else ExportOptions()
@@ -32,11 +32,11 @@ def write(stage: Path, folder: Path, ending: str) -> tuple[str, list[str]]:
 
 
 def unlike(case: EditCase, has_changed: bool, lines: list[str], ending: str) -> bool:
-    """Return whether a file has an edit and a line denies it, or the reverse."""
+    """Return whether file and lines contradict each other about an edit."""
     if case.what == ONLY_ONE and FORMATS[ending].is_seen:
         return False
     if FORMATS[ending].lacks is None:
-        return bool(lines)  # the stage flattened has all that is composed
+        return bool(lines)  # a flattened stage has all composed edits
     if case.outcome == "reported":
         return not any(case.words in line for line in lines)
     return has_changed == bool(lines)
@@ -44,7 +44,7 @@ def unlike(case: EditCase, has_changed: bool, lines: list[str], ending: str) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", sweep(TRIED, kept=[".glb", ".stl", ".nrrd"]))
-def test_each_edit_is_in_the_file_or_has_a_line(
+def test_each_edit_is_in_the_file_or_is_reported(
     edited: Callable[..., Path], tmp_path: Path, ending: str
 ) -> None:
     before, none = write(edited(lambda _: None), tmp_path / "before", ending)
@@ -86,7 +86,7 @@ def case_of(what: str) -> EditCase:
         ),
     ],
 )
-def test_a_line_says_what_a_format_has_no_field_for(
+def test_line_names_edits_that_a_format_has_no_field_for(
     edited: Callable[..., Path], tmp_path: Path, what: str, ending: str, words: str
 ) -> None:
     _, lines = write(edited(case_of(what).change), tmp_path / "out", ending)
@@ -95,7 +95,7 @@ def test_a_line_says_what_a_format_has_no_field_for(
 
 
 @pytest.mark.parametrize("ending", [".glb", ".usdz"])
-def test_a_file_of_some_tiles_says_that_it_leaves_additions_out(
+def test_file_of_some_tiles_reports_that_it_has_no_additions(
     edited: Callable[..., Path], tmp_path: Path, ending: str
 ) -> None:
     lines: list[str] = []

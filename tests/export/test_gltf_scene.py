@@ -1,4 +1,4 @@
-"""A plain glTF: what other programs read of it, held against the sphere that it shows."""
+"""Other programs read a plain glTF, and the result agrees with the sphere that it shows."""
 
 import json
 import shutil
@@ -60,7 +60,7 @@ def test_tiles_meet_without_a_gap(sphere_stage: Path, tmp_path: Path) -> None:
 
 
 def level_of(stage: Path, path: Path, options: ExportOptions) -> str:
-    """Export, and return the level that the line names."""
+    """Export; return the level of detail that the reported line names."""
     line = export_stage(stage, path, options=options)
     return line.partition(" at ")[2].partition(",")[0]
 
@@ -76,7 +76,7 @@ def test_the_same_stage_gives_the_same_bytes_and_nothing_else_is_left(
     assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
 
-def test_an_edit_over_the_stage_is_in_it(edited: Callable[..., Path], tmp_path: Path) -> None:
+def test_gltf_has_an_edit_over_the_stage(edited: Callable[..., Path], tmp_path: Path) -> None:
     layer = edited(
         lambda s: s.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(0.25, 0.5, 0.75))
     )
@@ -86,7 +86,7 @@ def test_an_edit_over_the_stage_is_in_it(edited: Callable[..., Path], tmp_path: 
 
 
 @pytest.mark.slow
-def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
+def test_gltf_has_points_edited_by_hand_and_a_coarser_level_of_a_tile(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:
     def change(stage: Usd.Stage) -> None:
@@ -101,7 +101,7 @@ def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
         other.SetVariantSelection("lod2")
 
     layer = edited(change)
-    for lod in (0, 1):  # coarser levels are made anew from what was edited
+    for lod in (0, 1):  # coarser levels are made again from the edited level
         told: list[str] = []
         export_stage(layer, tmp_path / "s.glb", options=ExportOptions(lod=lod), report=told.append)
         assert any(line.startswith("r0_c0/CD31: edited by hand: lod0") for line in told)
@@ -113,7 +113,7 @@ def test_points_edited_by_hand_and_a_tile_s_coarser_level_are_in_it(
 
 
 @pytest.mark.slow
-def test_the_finest_level_within_the_bounds_is_taken(sphere_stage: Path, tmp_path: Path) -> None:
+def test_finest_level_within_the_limits_is_written(sphere_stage: Path, tmp_path: Path) -> None:
     path = tmp_path / "s.glb"
     sizes = []
     for lod in (0, 1, 2):
@@ -134,9 +134,7 @@ def test_the_finest_level_within_the_bounds_is_taken(sphere_stage: Path, tmp_pat
     assert path.read_bytes() == before
 
 
-def test_a_level_that_is_given_is_the_finest_within_the_bounds(
-    sphere_stage: Path, tmp_path: Path
-) -> None:
+def test_given_level_is_the_finest_that_may_be_written(sphere_stage: Path, tmp_path: Path) -> None:
     path = tmp_path / "s.glb"
     rings = [n for n, _ in spheres.LEVELS]
     few = ExportOptions(lod=0, max_triangles=4 * rings[1] ** 2)
@@ -150,21 +148,19 @@ def test_a_level_that_is_given_is_the_finest_within_the_bounds(
 
 
 @pytest.mark.slow
-def test_what_a_region_leaves_out_is_not_counted(sphere_stage: Path, tmp_path: Path) -> None:
+def test_triangles_outside_a_region_are_not_counted(sphere_stage: Path, tmp_path: Path) -> None:
     path, box = tmp_path / "s.glb", parse_region("9:,:-5,:")
     export_stage(sphere_stage, path, options=ExportOptions(region=box))
     meshes = trimesh.load(path).geometry.values()
     within = sum(len(mesh.faces) for mesh in meshes)
-    assert within < 4 * spheres.LEVELS[1][0] ** 2  # of the whole at the next level
+    assert within < 4 * spheres.LEVELS[1][0] ** 2  # triangles of the whole sphere at the next level
     options = ExportOptions(region=box, max_triangles=within)
     assert level_of(sphere_stage, path, options) == "lod0"
     options = ExportOptions(region=box, max_triangles=within - 1)
     assert level_of(sphere_stage, path, options) == "lod1"
 
 
-def test_a_region_cuts_the_surface_and_tiles_leave_some_out(
-    sphere_stage: Path, tmp_path: Path
-) -> None:
+def test_region_cuts_the_surface_and_tiles_select_parts(sphere_stage: Path, tmp_path: Path) -> None:
     box = ExportOptions(region=parse_region("9:,:-5,:"))
     export_stage(sphere_stage, tmp_path / "s.glb", options=box)
     low, high = trimesh.load(tmp_path / "s.glb").bounds * 1e6
@@ -266,6 +262,6 @@ def test_khronos_validator_finds_no_error_and_three_opens_it(
     for file, found in json.loads(told.stdout).items():
         issues = found["issues"]
         assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"][:3]
-        if "draco" not in file:  # three decodes it in a worker of a browser
+        if "draco" not in file:  # three decodes draco only in a browser's worker
             ends = (spheres.CENTER - spheres.RADIUS, spheres.CENTER + spheres.RADIUS)
             np.testing.assert_allclose(found["box"], np.array(ends) * 1e-6, atol=3e-8)

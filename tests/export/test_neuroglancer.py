@@ -1,5 +1,6 @@
-"""A folder for Neuroglancer: another library reads the image, the meshes are as the format says,
-and Neuroglancer itself draws both."""
+"""A folder for Neuroglancer: another library reads its image, and its meshes follow the format.
+
+Neuroglancer itself draws both."""
 
 import json
 import os
@@ -40,7 +41,7 @@ def folder(sphere_stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 def read_meshes(folder: Path, segment: int) -> list[tuple[NDArray[np.float64], NDArray[Any]]]:
-    """Return each level's vertices in nm and its triangles, by the format's own words."""
+    """Return each level's vertices in nm and its triangles, by the format's specification."""
     info = json.loads((folder / "info").read_text("utf-8"))
     assert info["@type"] == "neuroglancer_multilod_draco"
     most = (1 << info["vertex_quantization_bits"]) - 1
@@ -97,14 +98,14 @@ def test_meshes_of_all_levels_lie_on_the_image(folder: Path) -> None:
     counts = [len(faces) for _, faces in levels]
     assert counts == sorted(counts, reverse=True)
     assert len(counts) == len(spheres.LEVELS)
-    # voxel (0, 0, 0) is centred half a voxel from the corner; y grows downwards
+    # The centre of voxel (0, 0, 0) is half a voxel from the corner; y grows downwards.
     x, y, z = spheres.CENTER
     center = np.array([x + 0.25, -y + 0.25, z + 0.5]) * 1e3
     for vertices, faces in levels:
         away = np.linalg.norm(vertices - center, axis=1)
         np.testing.assert_allclose(away, spheres.RADIUS * 1e3, atol=1)
         a, b, c = (vertices - center)[faces].transpose(1, 0, 2)
-        assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0  # turned outwards
+        assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0  # faces point outwards
     names = json.loads((folder / "mesh" / "segment_properties" / "info").read_text("utf-8"))[
         "inline"
     ]
@@ -112,7 +113,7 @@ def test_meshes_of_all_levels_lie_on_the_image(folder: Path) -> None:
     assert names["properties"] == [{"id": "label", "type": "label", "values": ["CD31"]}]
 
 
-def test_the_same_stage_gives_the_same_folder_in_place_of_an_older_one(
+def test_same_stage_gives_the_same_folder_and_replaces_an_older_one(
     sphere_stage: Path, folder: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "s.precomputed"
@@ -133,7 +134,7 @@ def test_the_same_stage_gives_the_same_folder_in_place_of_an_older_one(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_without_draco_it_says_how_to_install_it(
+def test_missing_draco_is_reported_with_how_to_install_it(
     sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "DracoPy", None)
@@ -146,7 +147,7 @@ def test_without_draco_it_says_how_to_install_it(
 
 
 class _Ranges(SimpleHTTPRequestHandler):
-    """Files for another page, and parts of them, which Neuroglancer takes meshes by."""
+    """Serves files and byte ranges to another page; Neuroglancer loads meshes by ranges."""
 
     def do_GET(self) -> None:
         file = Path(self.translate_path(self.path))
@@ -215,7 +216,7 @@ def test_neuroglancer_draws_image_and_mesh(folder: Path, tmp_path: Path) -> None
             state.layers["mesh"] = neuroglancer.SegmentationLayer(
                 source=f"precomputed://{url}/mesh", segments=[1], segment_colors={1: "#ff8000"}
             )
-            state.cross_section_scale = 5e-8  # m a pixel
+            state.cross_section_scale = 5e-8  # metres per pixel
             state.layout = neuroglancer.row_layout(
                 [
                     neuroglancer.LayerGroupViewer(layers=["image"], layout="xy"),

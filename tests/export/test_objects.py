@@ -1,4 +1,4 @@
-"""Objects of a label map: each with its name and colour, in one piece where tiles cut it."""
+"""Exported objects of a label map have names and colours, and are whole where tiles cut them."""
 
 import json
 import struct
@@ -34,7 +34,7 @@ def document(path: Path) -> dict:
     return json.loads(data[20 : 20 + length])
 
 
-def test_a_gltf_has_a_node_an_object_with_label_name_and_colour(
+def test_gltf_has_a_node_for_each_object_with_label_name_and_colour(
     stage: Path, tmp_path: Path
 ) -> None:
     export_stage(stage, tmp_path / "o.glb", options=ExportOptions())
@@ -50,7 +50,7 @@ def test_a_gltf_has_a_node_an_object_with_label_name_and_colour(
     assert colors == wanted
 
 
-def test_of_very_many_objects_a_tile_is_one_mesh_in_their_colours(
+def test_tile_of_very_many_objects_is_one_mesh_in_their_colours(
     stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(gltf_scene, "MAX_NODES", 1)
@@ -65,7 +65,7 @@ def test_of_very_many_objects_a_tile_is_one_mesh_in_their_colours(
     assert seen == {tuple(np.rint(255 * np.array(color)).astype(int).tolist()) for color in COLORS}
 
 
-def test_bodies_of_a_3mf_are_objects_closed_and_whole(stage: Path, tmp_path: Path) -> None:
+def test_3mf_has_closed_and_whole_objects(stage: Path, tmp_path: Path) -> None:
     options = ExportOptions(scale=1000, wall_mm=2.5, components=True)
     line = export_stage(stage, tmp_path / "o.3mf", options=options)
     bodies = trimesh.load(tmp_path / "o.3mf").geometry
@@ -73,11 +73,11 @@ def test_bodies_of_a_3mf_are_objects_closed_and_whole(stage: Path, tmp_path: Pat
     assert all(body.is_watertight for body in bodies.values())
     assert bodies["beam"].volume == pytest.approx(BEAM_UM3, rel=1e-6)
     assert bodies["left"].volume == pytest.approx(BALL_UM3, rel=0.03)
-    assert "beam: 1 of 1 bodies are thinner than 2.5 mm" in line  # it is 2 high
+    assert "beam: 1 of 1 bodies are thinner than 2.5 mm" in line  # the beam is 2 mm high
     assert "left" not in line.partition("\n")[2]
 
 
-def test_of_many_thin_bodies_some_are_named_and_all_are_counted(
+def test_some_of_many_thin_parts_are_named_and_all_are_counted(
     stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(print_solids, "_MAX_TOLD", 1)
@@ -88,12 +88,12 @@ def test_of_many_thin_bodies_some_are_named_and_all_are_counted(
     assert told[2] == f"... and of {len(NAMES) - 1} more parts"
 
 
-def test_a_label_map_has_no_volume_and_that_is_told(stage: Path, tmp_path: Path) -> None:
+def test_export_of_a_label_maps_volume_is_refused(stage: Path, tmp_path: Path) -> None:
     with pytest.raises(StageError, match="no volume of cells: of a label map the stage has surf"):
         export_stage(stage, tmp_path / "o.nrrd", options=ExportOptions(channels=("cells",)))
 
 
-def test_ply_has_their_colours_and_stl_is_one_solid(stage: Path, tmp_path: Path) -> None:
+def test_ply_has_the_colours_of_objects_and_stl_is_one_solid(stage: Path, tmp_path: Path) -> None:
     export_stage(stage, tmp_path / "o.ply", options=ExportOptions(scale=1000))
     wanted = {tuple(to_srgb8(np.array(color, np.float32)).tolist()) for color in COLORS}
     assert {
@@ -106,7 +106,7 @@ def test_ply_has_their_colours_and_stl_is_one_solid(stage: Path, tmp_path: Path)
     assert solid.volume == pytest.approx(2 * BALL_UM3 + BEAM_UM3, rel=0.03)
 
 
-def test_an_obj_has_their_names_and_colours(stage: Path, tmp_path: Path) -> None:
+def test_obj_has_names_and_colours_of_objects(stage: Path, tmp_path: Path) -> None:
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
         export_stage(stage, tmp_path / folder / "o.obj", options=ExportOptions(scale=1000))
@@ -124,7 +124,7 @@ def test_an_obj_has_their_names_and_colours(stage: Path, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(("scale", "units"), [(1.0, "m"), (1e6, "um")])
-def test_places_of_an_obj_keep_the_digits_of_a_float(
+def test_coordinates_of_an_obj_have_the_precision_of_a_float(
     stage: Path, tmp_path: Path, scale: float, units: str
 ) -> None:
     options = ExportOptions(scale=scale, units=units)
@@ -137,7 +137,7 @@ def test_places_of_an_obj_keep_the_digits_of_a_float(
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
 
 
-def test_neuroglancer_has_them_by_label(stage: Path, tmp_path: Path) -> None:
+def test_neuroglancer_lists_objects_by_label(stage: Path, tmp_path: Path) -> None:
     export_stage(stage, tmp_path / "o.precomputed", options=ExportOptions())
     info = json.loads((tmp_path / "o.precomputed/cells/segment_properties/info").read_text("utf-8"))
     named = dict(zip(info["inline"]["ids"], info["inline"]["properties"][0]["values"], strict=True))
@@ -146,7 +146,7 @@ def test_neuroglancer_has_them_by_label(stage: Path, tmp_path: Path) -> None:
     assert all((tmp_path / f"o.precomputed/cells/{label}.index").is_file() for label in LABELS)
 
 
-def test_a_picture_and_usd_show_them(stage: Path, tmp_path: Path) -> None:
+def test_picture_and_usd_files_of_objects_are_written(stage: Path, tmp_path: Path) -> None:
     for name in ("o.png", "o.usdz", "o.usdc"):
         options = ExportOptions(width=300) if name == "o.png" else ExportOptions()
         export_stage(stage, tmp_path / name, options=options)

@@ -1,4 +1,4 @@
-"""Pictures and turntables: what is seen, once round, the same bytes each time."""
+"""Pictures show the specimen, turntables go round it once, and bytes are the same each time."""
 
 import subprocess
 import sys
@@ -66,7 +66,7 @@ def test_a_picture_opens_with_the_channels_that_the_stage_shows(
     assert [channel.name for channel in chosen.channels] == ["CD31"]
 
 
-def test_shown_channels_whose_surfaces_are_hidden_leave_the_picture_to_the_others(
+def test_picture_shows_other_channels_if_visible_ones_have_hidden_surfaces(
     edited: Callable[..., Path],
 ) -> None:
     def hide(stage: Usd.Stage) -> None:
@@ -97,10 +97,10 @@ def test_a_picture_shows_the_sphere_in_its_edited_colour(
     seen = covered(pixels)
     red, green, blue = pixels[seen].mean(axis=0)
     assert green > 2 * max(red, blue)
-    # a circle, whose width is to its area as a circle's is
+    # Width and area have the ratio of a circle.
     width = np.ptp(np.flatnonzero(seen.any(axis=0))) + 1
     assert seen.sum() == pytest.approx(np.pi / 4 * width**2, rel=0.03)
-    # the box round it fills the picture, seen from a corner; both tiles' boxes are 3 times as wide
+    # The sphere's box, seen from a corner, fills the picture. The tiles' boxes are 3 times as wide.
     assert 0.6 < width / 300 < 0.75
     before = (tmp_path / "s.png").read_bytes()
     export_stage(layer, tmp_path / "s.png", options=ExportOptions(width=300))
@@ -114,7 +114,8 @@ def test_a_turntable_goes_once_round(
 ) -> None:
     monkeypatch.setattr(pictures, "_FRAMES", 8)
     path = tmp_path / f"s.{ending}"
-    half = ExportOptions(width=160, tiles=("r0_c0",))  # a bowl: it looks another way each time
+    # A bowl, which looks different from each side.
+    half = ExportOptions(width=160, tiles=("r0_c0",))
     export_stage(sphere_stage, path, options=half)
     frames = read(path)
     height, width, _ = frames[0].shape
@@ -122,7 +123,7 @@ def test_a_turntable_goes_once_round(
     assert height % 2 == 0
     seen = [covered(frame) for frame in frames]
     assert all(one.any() for one in seen)
-    # the red comes through, and each frame is another view
+    # Red is visible in each frame, and frames differ.
     for frame, one in zip(frames, seen, strict=True):
         assert frame[one][:, 0].mean() > frame[one][:, 2].mean()
     assert all((a ^ b).sum() > 30 for a, b in pairwise(seen))
@@ -131,7 +132,7 @@ def test_a_turntable_goes_once_round(
     assert path.read_bytes() == before
 
 
-def test_without_its_package_a_turntable_says_how_to_install_it(
+def test_missing_package_for_turntables_is_reported_with_how_to_install_it(
     sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
@@ -140,7 +141,7 @@ def test_without_its_package_a_turntable_says_how_to_install_it(
     assert not list(tmp_path.iterdir())
 
 
-def test_the_eye_s_way_round_is_to_the_right_of_the_specimen() -> None:
+def test_eye_of_a_turntable_moves_to_the_right() -> None:
     mesh = spheres.sphere(8, slice(None))
     moved = mesh.positions - spheres.CENTER.astype(np.float32)
     dot = Shape(
@@ -152,12 +153,12 @@ def test_the_eye_s_way_round_is_to_the_right_of_the_specimen() -> None:
         seen = covered(np.asarray(draw_image([dot], frame, (200, 200), turned_deg=turned)))
         return float(np.flatnonzero(seen.any(axis=0)).mean())
 
-    # before the specimen, seen from ever more to the right, it wanders to the left
+    # The dot is in front of the specimen. As the eye moves to the right, the dot moves to the left.
     assert middle(0) > middle(30) > middle(60)
 
 
 @pytest.mark.parametrize("turned", [0.0, 40.0, 95.0, 140.0, 337.2])
-def test_a_long_box_fits_however_it_is_turned(turned: float) -> None:
+def test_long_box_fits_at_every_angle(turned: float) -> None:
     low, high = np.array([-30.0, -4.0, -8.0]), np.array([30.0, 4.0, 8.0])
     box = trimesh.creation.box(bounds=(low, high))
     shape = Shape(

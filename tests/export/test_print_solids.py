@@ -1,4 +1,4 @@
-"""Solids for printers: closed, of the right volume, in the right unit, read back by others."""
+"""Solids for printers are closed and have the right volume and unit, read by other libraries."""
 
 import zipfile
 from collections.abc import Callable
@@ -28,7 +28,7 @@ ENDINGS = ["stl", "3mf", "ply", "obj"]
 
 
 def read(path: Path) -> trimesh.Trimesh:
-    """Return a file's mesh with equal places joined. VTK reads PLY and OBJ: trimesh wrote them."""
+    """Return a file's mesh with equal vertices joined. VTK reads PLY and OBJ, not trimesh."""
     if path.suffix == ".3mf":
         return trimesh.load(path, force="mesh", process=True)
     found = pyvista.read(path)
@@ -45,7 +45,7 @@ def test_two_tiles_become_one_closed_solid_of_the_sphere_s_volume(
     assert found.is_watertight
     assert found.is_winding_consistent
     assert len(found.split()) == 1
-    # 2000 times the specimen: an um is 2 mm; the solid is made of chords, inside the sphere
+    # At 2000 times the specimen, 1 um is 2 mm. The solid is made of chords inside the sphere.
     inside = VOLUME_UM3 * 2**3
     assert found.volume == pytest.approx(inside, rel=0.012)
     assert found.volume < inside
@@ -68,7 +68,7 @@ def test_volume_is_that_of_the_mesh_within_rounding(sphere_stage: Path, tmp_path
 
 def test_without_a_scale_it_fits_a_hand(sphere_stage: Path, tmp_path: Path) -> None:
     line = export_stage(sphere_stage, tmp_path / "s.stl", options=ExportOptions())
-    assert "5000 times the specimen" in line  # 20 um wide: 100 mm
+    assert "5000 times the specimen" in line  # from 20 um to 100 mm wide
     line = export_stage(
         sphere_stage, tmp_path / "s.stl", options=ExportOptions(scale=1, units="um")
     )
@@ -97,7 +97,7 @@ def test_a_tile_and_a_region_are_cut_off_and_closed(sphere_stage: Path, tmp_path
         assert found.volume == pytest.approx(share * VOLUME_UM3, rel=0.02)
 
 
-def test_what_is_thinner_than_a_wall_is_named(sphere_stage: Path, tmp_path: Path) -> None:
+def test_parts_thinner_than_a_wall_are_named(sphere_stage: Path, tmp_path: Path) -> None:
     thick = ExportOptions(scale=1000, wall_mm=6.9)  # the ball is 7 mm thick
     assert "thinner" not in export_stage(sphere_stage, tmp_path / "s.stl", options=thick)
     thin = ExportOptions(scale=1000, wall_mm=7.1)
@@ -106,17 +106,19 @@ def test_what_is_thinner_than_a_wall_is_named(sphere_stage: Path, tmp_path: Path
     assert "6.9 mm at (10, -5, 4)" in line or "7 mm at (10, -5, 4)" in line
 
 
-def test_places_of_thin_bodies_are_in_the_file_s_unit(sphere_stage: Path, tmp_path: Path) -> None:
+def test_places_of_thin_parts_are_in_the_unit_of_the_file(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
     thin = ExportOptions(scale=1000, wall_mm=7.1, units="m", channels=("CD31",))
     line = export_stage(sphere_stage, tmp_path / "s.obj", options=thin).split("\n")[1]
     assert line.endswith(" mm at (0.01, -0.005, 0.004)")
     assert read(tmp_path / "s.obj").centroid == pytest.approx((0.01, -0.005, 0.004), rel=0.02)
 
 
-def test_a_solid_that_touches_itself_is_closed_to_programs_that_join_places() -> None:
+def test_solid_that_touches_itself_stays_closed_if_equal_vertices_are_joined() -> None:
     cube = trimesh.creation.box()
     faces = cube.faces.astype(np.uint32)
-    for by in ((1.0, 1.0, 0.0), (1.0, 1.0, 1.0)):  # an edge in common, and a corner
+    for by in ((1.0, 1.0, 0.0), (1.0, 1.0, 1.0)):  # the cubes share an edge, then a corner
         places = (cube.vertices, cube.vertices + by)
         solids = [to_solid(at.astype(np.float32), faces, "cube") for at in places]
         found = trimesh.Trimesh(*to_mesh(unite(solids)), process=True)
@@ -151,7 +153,7 @@ def _move(stage: Usd.Stage, tile: str, by: tuple[float, float, float]) -> None:
 
 def test_a_corner_that_is_missing_is_closed_along_the_lines_where_planes_meet() -> None:
     ball = trimesh.creation.icosphere(3, 5.0)
-    # three of four quarters, each cut from the same sphere; the middle lies beside the planes
+    # Three of four quarters of one sphere, whose middle lies beside the cutting planes.
     planes = ((0, 0.7), (1, -0.4))
     parts = []
     for low, high in (
@@ -221,7 +223,7 @@ def test_cut_through_vertices_leaves_no_solid_that_touches_itself() -> None:
     assert cut_to(solid, boxes).volume() == pytest.approx(0.75 * solid.volume(), rel=2e-3)
 
 
-def test_any_name_can_stand_in_a_3mf(tmp_path: Path) -> None:
+def test_3mf_may_contain_any_name(tmp_path: Path) -> None:
     cube = trimesh.creation.box()
     name = 'a<b> & "c"\x01\N{GREEK SMALL LETTER EPSILON}'
     body = Body(name, (1, 2, 3), cube.vertices.astype(np.float32), cube.faces.astype(np.uint32))

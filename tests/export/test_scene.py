@@ -1,4 +1,4 @@
-"""The page in one file: a bundle at the finest levels that fit, and nothing that reaches a host."""
+"""The page in one file has the finest levels that fit, and sends no request to any host."""
 
 import base64
 import gzip
@@ -33,12 +33,12 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def built_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A viewer of a few files, for a checkout whose viewer is not built."""
+    """A viewer of a few files, because a checkout may have no built viewer."""
     use_small_viewer(tmp_path / "dist", monkeypatch)
 
 
 class Page(HTMLParser):
-    """The blocks of a page: of the viewer and of the bundle, unpacked, by name."""
+    """The unpacked blocks of a page, from the viewer and from the bundle, by name."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()
@@ -77,7 +77,7 @@ def least_mb(bundle: Path, file: Path) -> float:
     return float(found[1])
 
 
-def test_everything_fits_and_is_as_in_the_bundle(bundle: Path, tmp_path: Path) -> None:
+def test_page_with_enough_space_has_all_files_of_the_bundle(bundle: Path, tmp_path: Path) -> None:
     about = write_scene(bundle, tmp_path / "s.html")
     found = Page(tmp_path / "s.html").blocks
     assert "surfaces at lod0 and volumes at mip level 0 (" in about
@@ -100,7 +100,7 @@ def test_the_bundle_in_a_page_passes_check(
     most = least_mb(bundle, tmp_path / "s.html") if is_coarse else 25
     write_scene(bundle, tmp_path / "s.html", max_mb=most)
     folder = Page(tmp_path / "s.html").extract(tmp_path / "bundle")
-    (folder / "environments" / "sky.hdr").unlink()  # of the viewer
+    (folder / "environments" / "sky.hdr").unlink()  # a file of the viewer
     assert main(["check", str(folder)]) == 0, capsys.readouterr().err
 
 
@@ -120,13 +120,13 @@ def test_the_coarsest_levels_are_those_of_the_bundle(bundle: Path, tmp_path: Pat
         hashes = [level["sha256"] for level in before["levels"]]
         assert 1 <= len(frames) < len(hashes)
         assert frames == hashes[-len(frames) :]
-        assert volume["size"] == before["size"]  # in which its bricks are counted
+        assert volume["size"] == before["size"]  # bricks are counted in the full size
     left = {name for name in files if name.endswith(".glb")}
     assert left
     assert not {name for name in left if name.endswith("lod0.glb")}
 
 
-def test_a_command_that_is_given_a_scene_names_it_and_the_way_to_go(
+def test_command_on_an_exported_scene_names_it_and_the_remedy(
     bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_scene(bundle, tmp_path / "a.html")
@@ -175,9 +175,7 @@ def test_a_link_is_the_view_and_another_text_is_refused(bundle: Path, tmp_path: 
             write_scene(bundle, tmp_path / "s.html", view=text)
 
 
-def test_the_page_runs_its_own_script_alone_and_reaches_no_host(
-    bundle: Path, tmp_path: Path
-) -> None:
+def test_page_runs_only_its_own_script_and_reaches_no_host(bundle: Path, tmp_path: Path) -> None:
     write_scene(bundle, tmp_path / "s.html")
     text = (tmp_path / "s.html").read_text("utf-8")
     (script,) = re.findall(r"<script>(.*?)</script>", text, re.S)
@@ -206,7 +204,7 @@ def test_options_of_other_formats_are_refused(
 
 @pytest.mark.parametrize("count", [3, 70])
 def test_levels_are_taken_out_of_tilesets_of_few_and_of_many_tiles(count: int) -> None:
-    """Where tiles are many, each has a tileset of its own for its finer levels."""
+    """If there are many tiles, each has its own tileset for its finer levels."""
     corner = SimpleNamespace(low=(0.0, 0.0, 0.0), high=(1e-3, 1e-3, 1e-3))
     tiles = [
         [
@@ -221,5 +219,5 @@ def test_levels_are_taken_out_of_tilesets_of_few_and_of_many_tiles(count: int) -
     every = {(lod.uri, int(lod.uri[-5])) for lods in tiles for lod in lods}
     assert set(surfaces(root)) == every
     cut = without_finer(root, 2)
-    # the first tile has one level, which stays
+    # The only level of the first tile stays.
     assert set(surfaces(cut)) == {one for one in every if one[1] >= 2 or one[0] == "t0/lod0.glb"}

@@ -1,4 +1,4 @@
-"""Parts of a .3mf in slicers: sliced, and held against the places that the stage has."""
+"""Slicers slice the parts of a .3mf at the places that the parts have in the stage."""
 
 import re
 import shutil
@@ -19,7 +19,7 @@ from stereocell.model.color import to_srgb8
 from support.solid_channels import BALLS, COLORS, write_solid_channels
 
 LAYER_MM = 0.2
-LINE_MM = 0.6  # largest width of a line: extrusions lie half of it inside the surface
+LINE_MM = 0.6  # mm, largest width of a line; extrusions lie half of it inside the surface
 BY_SIZE = ["tissue", "vessel", "nucleus"]
 
 
@@ -29,7 +29,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def slice_by_prusa(model: Path, folder: Path) -> dict[int, NDArray[np.float64]]:
-    """Return the ends of extrusions (x, y, z) in mm by the number of the extruder, from 0."""
+    """Return the ends of extrusions (x, y, z), mm, by the number of the extruder, from 0."""
     program = shutil.which("prusa-slicer")
     if program is None:
         pytest.skip("prusa-slicer is not installed: apt-get install prusa-slicer")
@@ -64,7 +64,7 @@ def test_prusaslicer_prints_each_channel_where_the_stage_has_it(
 ) -> None:
     export_stage(stage, tmp_path / "s.3mf", options=ExportOptions(scale=1000))
     sliced = slice_by_prusa(tmp_path / "s.3mf", tmp_path)
-    assert sorted(sliced) == [0, 1, 2]  # a filament a channel
+    assert sorted(sliced) == [0, 1, 2]  # one filament for each channel
     shifts = []
     for tool, name in enumerate(BALLS):  # filaments are in the order of the channels
         center, radius = np.array(BALLS[name][0]), BALLS[name][1]
@@ -72,20 +72,21 @@ def test_prusaslicer_prints_each_channel_where_the_stage_has_it(
         np.testing.assert_allclose((high - low)[:2], 2 * radius, atol=LINE_MM + 0.1)
         assert high[2] - low[2] == pytest.approx(2 * radius, abs=2 * LAYER_MM)
         shifts.append((low + high) / 2 - center)
-    # The whole specimen was moved to the bed as one: all parts by the same way.
+    # The slicer moved the whole specimen to the bed, all parts by the same vector.
     np.testing.assert_allclose(shifts, np.broadcast_to(shifts[0], (3, 3)), atol=LAYER_MM)
     tissue_bottom = BALLS["tissue"][0][2] - BALLS["tissue"][1]
     assert shifts[0][2] == pytest.approx(-tissue_bottom, abs=LAYER_MM)
 
 
 @pytest.mark.slow
-def test_prusaslicer_takes_components_apart(stage: Path, tmp_path: Path) -> None:
-    """The reason for which parts are ranges by default: it would put the vessel on the bed."""
+def test_prusaslicer_moves_components_apart(stage: Path, tmp_path: Path) -> None:
+    """Parts are ranges by default, because PrusaSlicer would put the vessel on the bed."""
     export_stage(stage, tmp_path / "s.3mf", options=ExportOptions(scale=1000, components=True))
     sliced = slice_by_prusa(tmp_path / "s.3mf", tmp_path)
     lowest = np.concatenate(list(sliced.values()))[:, 2].min()
     highest = np.concatenate(list(sliced.values()))[:, 2].max()
-    assert highest - lowest < 2 * BALLS["tissue"][1] + LAYER_MM  # it is 20 mm high in the stage
+    # In the stage, the vessel lies above the tissue.
+    assert highest - lowest < 2 * BALLS["tissue"][1] + LAYER_MM
 
 
 def test_ranges_are_closed_parts_with_name_and_filament(stage: Path, tmp_path: Path) -> None:
@@ -109,7 +110,7 @@ def test_ranges_are_closed_parts_with_name_and_filament(stage: Path, tmp_path: P
         assert part.is_watertight
         np.testing.assert_allclose(part.centroid, center, atol=1e-3)
         assert part.volume == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.02)
-        # PrusaSlicer takes the vertices between the least and the largest number of a part.
+        # PrusaSlicer takes all vertices from the lowest to the highest index of a part.
         assert len(np.unique(faces)) == np.ptp(faces) + 1
         first += len(faces)
     assert first == len(whole.faces)

@@ -1,4 +1,4 @@
-"""USD in one file: valid, with edits, of the tiles and channels asked for, the same each time."""
+"""USD in one file is valid, reproducible, and has edits and only the chosen tiles and channels."""
 
 import os
 from collections.abc import Callable
@@ -52,7 +52,7 @@ def test_one_file_has_the_level_the_edit_and_the_tiles(
     assert "Hoechst" not in cut.ExportToString()
 
 
-def test_a_flattened_stage_names_its_files_from_where_it_lies(
+def test_flattened_stage_names_its_files_relative_to_itself(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
     export_stage(sphere_stage, tmp_path / "s.usda", options=ExportOptions())
@@ -65,7 +65,7 @@ def test_a_flattened_stage_names_its_files_from_where_it_lies(
 def test_files_on_another_drive_are_named_from_its_root(
     sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of Windows: from one drive to another no relative path leads."""
+    """On Windows, no relative path leads from one drive to another."""
 
     def refuse(*_: object) -> str:
         raise ValueError("path is on mount 'C:', start on mount 'D:'")
@@ -95,7 +95,7 @@ def test_a_scale_enlarges_the_file_and_the_line_has_both_sizes(
 def test_the_cameras_of_an_enlarged_file_see_what_they_saw(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
-    """A camera's clipping range is in units of the stage, whatever is above the camera."""
+    """A camera's clipping range is in units of the stage; transforms above do not scale it."""
     cameras = []
     for scale in (1.0, 2000.0):
         path = tmp_path / f"{scale:g}.usda"
@@ -153,7 +153,7 @@ def test_additions_lights_and_cameras_are_enlarged_with_the_specimen(
 
 
 def bounds(stage: Usd.Stage) -> NDArray[np.float64]:
-    """Return the least and the largest corner of all meshes in the world, (2, 3)."""
+    """Return the lowest and the highest corner of all meshes in the world, (2, 3)."""
     boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
     found = [boxes.ComputeWorldBound(mesh.GetPrim()) for mesh in meshes(stage).values()]
     ranges = [one.ComputeAlignedRange() for one in found]

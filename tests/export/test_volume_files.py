@@ -1,4 +1,4 @@
-"""Volumes: other libraries find each voxel's value where it was, turned patients and all."""
+"""Other libraries find each voxel's value at its true place, also in oblique scans."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +24,7 @@ NM = 1e-6  # mm
 
 @pytest.fixture(scope="module")
 def counted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The stage with CD31's voxels as measured, every one different from its neighbours."""
+    """The stage with CD31's voxels as measured; each differs from its neighbours."""
     tiles = [spheres.tile(column, (spheres.RED,), measured=True) for column in (0, 1)]
     return write_tiles(tmp_path_factory.mktemp("counted"), tiles)
 
@@ -34,7 +34,7 @@ COUNTS = spheres.counts((0, 0, 0), WHOLE)
 
 
 def unit(ending: str) -> float:
-    """Return the length of an um, as SimpleITK reads it: it turns NIfTI's unit into mm."""
+    """Return the length of 1 um in SimpleITK, which converts NIfTI's unit to mm."""
     return 1e-3 if ending.startswith("nii") else 1.0
 
 
@@ -44,7 +44,7 @@ def read(path: Path) -> tuple[NDArray[np.generic], SimpleITK.Image]:
 
 
 @pytest.mark.parametrize("ending", ["nrrd", "nhdr", "nii.gz", "nii"])
-def test_the_source_s_values_lie_where_they_were(
+def test_values_of_the_source_are_at_their_places(
     counted: Path, tmp_path: Path, ending: str
 ) -> None:
     name = "s.raw" if ending == "nhdr" else f"s.{ending}"
@@ -63,7 +63,7 @@ def test_the_source_s_values_lie_where_they_were(
     assert (tmp_path / name).read_bytes() == before
 
 
-def test_channels_are_there_with_their_names_in_8_bits(sphere_stage: Path, tmp_path: Path) -> None:
+def test_8_bit_file_has_channels_with_their_names(sphere_stage: Path, tmp_path: Path) -> None:
     balls = spheres.ball((0, 0, 0), WHOLE)
     export_stage(sphere_stage, tmp_path / "s.nrrd", options=ExportOptions())
     values, image = read(tmp_path / "s.nrrd")
@@ -106,10 +106,10 @@ def test_a_specimen_that_was_turned_lies_obliquely(
     assert np.abs(np.array(image.GetDirection())).max() < 0.98
 
 
-def test_of_a_turned_specimen_a_region_is_the_least_box_of_voxels_round_it(
+def test_region_of_a_turned_specimen_is_the_smallest_box_of_voxels_round_it(
     sphere_stage: Path, edited: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """A scanner has its patients turned by some degrees."""
+    """In a scanner, patients often lie turned by some degrees."""
 
     def move(stage: Usd.Stage) -> None:
         tiles = UsdGeom.XformCommonAPI(stage.GetPrimAtPath("/Specimen/Tiles"))
@@ -138,7 +138,7 @@ def test_of_a_turned_specimen_a_region_is_the_least_box_of_voxels_round_it(
     assert values.size < whole.size / 2
 
 
-def test_what_is_in_no_region_is_told_with_where_there_is_something(
+def test_empty_region_is_refused_with_the_extent_of_the_content(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
     for name, kind in (("s.glb", "surface"), ("s.png", "surface"), ("s.nrrd", "voxel")):
@@ -151,7 +151,7 @@ def test_what_is_in_no_region_is_told_with_where_there_is_something(
 
 
 @pytest.mark.slow
-def test_an_oblique_patient_s_voxels_are_in_the_patient_s_place(
+def test_voxels_of_an_oblique_scan_are_at_the_place_in_the_patient(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shape = (16, 20, 18)
@@ -210,7 +210,9 @@ def test_a_tile_that_was_moved_by_whole_voxels_is_moved_and_by_others_refused(
                 export_stage(path, tmp_path / "s.nrrd", options=ExportOptions())
 
 
-def test_unity_gets_one_channel_upright_with_its_ini(sphere_stage: Path, tmp_path: Path) -> None:
+def test_file_for_unity_has_one_upright_channel_and_an_ini_file(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
     with pytest.raises(UsageError, match="--unity takes one channel, expected --channels with one"):
         export_stage(sphere_stage, tmp_path / "s.raw", options=ExportOptions(unity=True))
     options = ExportOptions(unity=True, channels=("CD31",))
@@ -222,7 +224,7 @@ def test_unity_gets_one_channel_upright_with_its_ini(sphere_stage: Path, tmp_pat
     }  # fmt: skip
     ball = spheres.ball((0, 0, 0), WHOLE)
     values = np.fromfile(tmp_path / "s.raw", "u1").reshape(WHOLE)
-    # Unity's y grows upwards, and its z away from the viewer: else all would be mirrored
+    # Unity's y grows upwards, and its z away from the viewer. Otherwise the volume is mirrored.
     np.testing.assert_array_equal(values, ball[::-1, ::-1])
     export_stage(sphere_stage, tmp_path / "s.nrrd", options=options)
     upright, image = read(tmp_path / "s.nrrd")
@@ -230,7 +232,9 @@ def test_unity_gets_one_channel_upright_with_its_ini(sphere_stage: Path, tmp_pat
     assert image.TransformIndexToPhysicalPoint((0, 19, 8)) == pytest.approx((0, 0, 0), abs=NM)
 
 
-def test_bits_are_what_the_stage_has(sphere_stage: Path, counted: Path, tmp_path: Path) -> None:
+def test_default_bits_are_those_of_the_stage(
+    sphere_stage: Path, counted: Path, tmp_path: Path
+) -> None:
     with pytest.raises(UsageError, match="--bits 16: the stage has no more than 8 of CD31"):
         export_stage(
             sphere_stage, tmp_path / "s.nrrd", options=ExportOptions(bits=16, channels=("CD31",))

@@ -1,4 +1,4 @@
-"""The command: the ending chooses, options that can't be are refused, errors leave nothing."""
+"""The ending chooses the format, impossible options are refused, and errors leave no file."""
 
 import argparse
 import json
@@ -47,23 +47,21 @@ def test_a_region_is_three_spans(text: str) -> None:
 def test_a_region_may_begin_left_of_zero(
     sphere_stage: Path, tmp_path: Path, words: list[str]
 ) -> None:
-    """Where a patient's specimen lies: argparse takes the minus for that of another flag."""
+    """Patients have negative coordinates, and argparse could take the minus for another flag."""
     shutil.copytree(sphere_stage.parent, tmp_path / "out" / "stage")
     file = tmp_path / "s.glb"
     assert main(["export", str(tmp_path / "out"), *words, str(file)]) == 0
     assert file.is_file()
 
 
-def test_what_a_killed_command_left_is_removed(sphere_stage: Path, tmp_path: Path) -> None:
+def test_rest_of_a_killed_command_is_removed(sphere_stage: Path, tmp_path: Path) -> None:
     (tmp_path / ".s.glb.0123abcd.partial").mkdir()
-    (tmp_path / ".t.glb.0123abcd.partial").mkdir()  # of another file
+    (tmp_path / ".t.glb.0123abcd.partial").mkdir()  # rest of another file
     export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions())
     assert {one.name for one in tmp_path.iterdir()} == {"s.glb", ".t.glb.0123abcd.partial"}
 
 
-def test_the_folder_of_the_file_is_made_as_by_the_other_commands(
-    sphere_stage: Path, tmp_path: Path
-) -> None:
+def test_missing_folder_of_the_file_is_made(sphere_stage: Path, tmp_path: Path) -> None:
     export_stage(sphere_stage, tmp_path / "for" / "printing" / "s.stl", options=ExportOptions())
     assert [one.name for one in (tmp_path / "for" / "printing").iterdir()] == ["s.stl"]
     (tmp_path / "file").write_text("")
@@ -86,7 +84,7 @@ def test_a_failure_half_way_leaves_the_older_file(
     assert (tmp_path / "s.raw").read_text("utf-8") == "old"
 
 
-def test_no_part_of_a_build_and_no_edit_is_written_over(
+def test_parts_of_a_build_and_edits_are_not_overwritten(
     sphere_stage: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
@@ -106,7 +104,7 @@ def test_no_part_of_a_build_and_no_edit_is_written_over(
     assert "export: 2/2 r0_c1" in told.err
 
 
-def test_every_ending_says_its_own_options_in_the_flags_of_the_command() -> None:
+def test_options_of_all_endings_are_flags_of_the_command() -> None:
     known = {field.name for field in fields(ExportOptions)}
     takes = (way.takes for way in FORMATS.values())
     assert PAGE_TAKES.union(*takes) | {"channels"} == known
@@ -118,7 +116,7 @@ def test_help_of_a_flag_names_all_endings_that_take_it() -> None:
     listing = set()
     for action in parser._actions:
         named = set(re.findall(r"\.[a-z0-9]+", action.help or "")) & FORMATS.keys()
-        if len(named) > 1:  # else the help is about one format
+        if len(named) > 1:  # otherwise the help is about one format
             takers = {one for one, way in FORMATS.items() if action.dest in way.takes}
             assert named == takers - {".nii.gz"}, action.dest
             listing.add(action.dest)
@@ -138,7 +136,7 @@ def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture
 def test_a_full_disk_is_one_line_and_leaves_nothing(
     sphere_stage: Path, small_disk: Path, capfd: pytest.CaptureFixture[str], ending: str
 ) -> None:
-    """In a process of its own: a mapped file for which there is no room kills it."""
+    """Runs in a process of its own, which a mapped file without space on the disk would kill."""
     out = small_disk.parent / "out"
     shutil.copytree(sphere_stage.parent, out / "stage")
     full = small_disk / "full"
@@ -146,11 +144,11 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
         while True:
             file.write(bytes(4096))
     with full.open("r+b") as file:
-        file.truncate(full.stat().st_size - 8192)  # for folders and heads
+        file.truncate(full.stat().st_size - 8192)  # leaves space for folders and heads
     file = small_disk / f"a{ending}"
     command = [sys.executable, "-m", "stereocell.cli", "export", str(out), str(file)]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
-    if answer.returncode == 0:  # the sphere in it is as small as the room that is left
+    if answer.returncode == 0:  # the sphere's file is small enough for the remaining space
         assert file.stat().st_size <= 8192
         return
     assert answer.returncode == 1, answer.stderr

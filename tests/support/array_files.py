@@ -1,6 +1,6 @@
 """Imaris, CZI, LIF and N5 files of known voxels, written by h5py, Zeiss's library and tensorstore.
 
-LIF has no writer: it is made here byte by byte.
+No library writes LIF, so that file is made here byte by byte.
 """
 
 import json
@@ -18,7 +18,7 @@ from pylibCZIrw import czi
 from support.phantoms import f_phantom
 
 SIZE_UM = (0.5, 0.2, 0.25)  # z, y, x
-BLOCK = (16, 12, 8)  # x, y, z: of N5
+BLOCK = (16, 12, 8)  # voxels of an N5 block (x, y, z)
 
 
 def characters(text: str) -> NDArray[Any]:

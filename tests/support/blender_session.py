@@ -26,7 +26,7 @@ _turns = count()
 @cache
 def blender() -> subprocess.Popen[str]:
     """Start Blender, which runs step after step until this process ends."""
-    folder = tempfile.TemporaryDirectory()  # each step leaves one of Blender's own in it
+    folder = tempfile.TemporaryDirectory()  # in it, each step leaves a folder that Blender makes
     atexit.register(folder.cleanup)
     process = subprocess.Popen(
         [PYTHON, str(_SESSION)],
@@ -50,7 +50,7 @@ def run(step: str, folder: Path, **arguments: Any) -> Any:
     print(json.dumps({"step": step, "arguments": str(file)}), file=process.stdin, flush=True)
     if not select([process.stdout], [], [], 300)[0]:
         process.kill()
-        blender.cache_clear()  # the next step has another one
+        blender.cache_clear()  # the next step gets a new Blender
         pytest.fail(f"{step}: no end after 300 s")
     code = process.stdout.readline().strip()
     said = Path(f"{result}.txt").read_text("utf-8")

@@ -1,4 +1,4 @@
-"""Hold a picture of the viewer against the float64 reference renderer.
+"""Compare a picture of the viewer with that of the float64 reference renderer.
 
     bundle_picture.py BUNDLE PICTURE.png
 
@@ -18,8 +18,8 @@ from PIL import Image
 
 from support.reference_raymarch import Block, Camera, encode, psnr, render
 
-BACKGROUND = (11 / 255, 13 / 255, 18 / 255)  # the room's, sRGB
-LEVELS_AT = 80  # of a KTX 2.0 file: index of levels, each offset, length, uncompressed length
+BACKGROUND = (11 / 255, 13 / 255, 18 / 255)  # sRGB, the background of the viewer's scene
+LEVELS_AT = 80  # bytes; a KTX 2.0 file lists its levels there: offset, length, raw length
 
 
 def unzstd(data: bytes, size: int) -> NDArray[np.uint8]:
@@ -63,7 +63,7 @@ def read_blocks(bundle: Path, names: list[str]) -> list[Block]:
 
 
 def main(bundle: Path, picture: Path) -> None:
-    """Print how near the picture comes."""
+    """Print the PSNR of the picture."""
     asked = json.load(sys.stdin)
     found = np.asarray(Image.open(picture).convert("RGB"))
     height, width = found.shape[:2]

@@ -54,7 +54,7 @@ def files(folder):
 def write_bundle(stage, folder, viewer, *, engine, parts=None, report_line=lambda _: None):
     """Write the bundle of a stage outside of a build, in the order of building/phases.py.
 
-    parts  a folder for finished tiles, which are taken and left there; None: none are kept
+    parts  folder in which finished tiles are kept and found again; None: a temporary folder
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     kept = nullcontext(parts) if parts else tempfile.TemporaryDirectory(dir=folder.parent)
@@ -86,7 +86,8 @@ def chain(bundle, tile):
             if "children" not in entry:
                 break
             (entry,) = entry["children"]
-        assert entry["geometricError"] == 0  # nothing finer: a reader stops there
+        # 0 states that there is no finer level, so a reader stops.
+        assert entry["geometricError"] == 0
         found += [levels] * (folder == tile)
     (levels,) = found
     return levels

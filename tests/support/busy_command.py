@@ -30,7 +30,7 @@ if __name__ == "__main__":
 def start_script(script: str, folder: Path, *words: object) -> "subprocess.Popen[str]":
     """Start a Python script that can import the tests' support; its stderr is a pipe.
 
-    words  its arguments
+    words  arguments of the script
     """
     file = folder / "it's a script.py"
     file.write_text(script)

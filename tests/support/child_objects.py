@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 
-LONG_S = 600.0  # seconds that no test waits for
+LONG_S = 600.0  # longer than any test waits
 
 
 class Counter:

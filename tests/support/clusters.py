@@ -54,7 +54,7 @@ def as_variables(settings: Mapping[str, object]) -> dict[str, str]:
 def wait_for_scheduler(file: Path) -> None:
     """Wait until a scheduler has written the whole of its scheduler file, at most PATIENCE_S."""
     end = time.monotonic() + PATIENCE_S
-    # Dask opens the file before it writes it, so that a file which is there may still be empty.
+    # Dask opens the file before it writes it, so an existing file may still be empty.
     while time.monotonic() < end:
         with suppress(FileNotFoundError, ValueError):
             json.loads(file.read_text("utf-8"))
@@ -84,7 +84,7 @@ def running_cluster(
         with dask.config.set(settings):
             processes = [_start(folder, given, "scheduler", "--port", "0", "--protocol", "tls")]
             try:
-                # without a nanny, which would start a killed worker again
+                # A nanny would start a killed worker again.
                 lone = ("worker", "--nthreads", "1", "--no-nanny")
                 processes += [_start(folder, given, *lone) for _ in range(workers)]
                 wait_for_scheduler(file)

@@ -66,7 +66,7 @@ def read_steps(containerfile: Path) -> list[Step]:
 
 @dataclass
 class Image:
-    """The image so far. `after_install` is called once packages are installed."""
+    """The image after the steps so far; `after_install` is called once packages are installed."""
 
     root: Path
     context: Path  # the folder that COPY reads
@@ -89,7 +89,7 @@ class Image:
         return found
 
     def environment(self) -> dict[str, str]:
-        """The environment of the image: only its own programs are found, and compilers fail."""
+        """The image's environment: only its own programs are found, and compilers fail."""
         ours = ("PYTHONPATH", "VIRTUAL_ENV", "PYTHONHOME", "NUMBA_CACHE_DIR", "PYTHONWARNINGS")
         inherited = {name: value for name, value in os.environ.items() if name not in ours}
         path = f"{self.venv / 'bin'}:{self.root / 'programs'}"

@@ -1,6 +1,7 @@
-"""Ctrl+C in tests. Shells have SIGINT ignored in what they start in the background.
+"""Ctrl+C in tests. Shells make programs that they start in the background ignore SIGINT.
 
-Such a program leaves it ignored, and so do those that it starts, Python and ours among them.
+A program that starts with SIGINT ignored keeps ignoring it, and so do the programs that it starts.
+Python and StereoCell behave like this, too.
 """
 
 import signal
@@ -10,7 +11,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def heeded() -> Iterator[None]:
-    """Within, SIGINT interrupts this process and those that it starts, wherever it was started."""
+    """Let SIGINT interrupt this process and its children, even if it runs in the background."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
@@ -20,7 +21,7 @@ def heeded() -> Iterator[None]:
 
 @contextmanager
 def ignored() -> Iterator[None]:
-    """Within, processes are started as in the background of a shell."""
+    """Start processes as a shell starts them in the background: they ignore SIGINT."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield

@@ -34,7 +34,7 @@ def write_kind(
     modality: str = "MR",
     first_number: int = 1,
 ) -> None:
-    """Write slices of series 1.2.3 whose values are the scene's, and `add`."""
+    """Write slices of series 1.2.3 whose values are the scene's values plus `add`."""
 
     def changed(ds: pydicom.Dataset) -> None:
         ds.InstanceNumber += first_number - 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from support.dicom_series import image, sample, save
 
-SHAPE = (7, 18, 20)  # of 7 slices in 3 x 3 places
+SHAPE = (7, 18, 20)  # voxels (z, y, x); the 7 slices are laid out in 3 x 3 places
 SPACING = (2.5, 2.0, 2.2)
 
 
@@ -47,7 +47,7 @@ def write_mosaic(
     for k, plane in enumerate(voxels):
         row, column = divmod(k, side)
         pixels[row * rows : (row + 1) * rows, column * columns : (column + 1) * columns] = plane
-    corner = affine.copy()  # as if the mosaic were one slice about the same middle
+    corner = affine.copy()  # places the mosaic as if it were one slice with the same middle
     corner[:3, 3] -= (
         affine[:3, 1] * (side - 1) * rows / 2 + affine[:3, 2] * (side - 1) * columns / 2
     )

@@ -1,4 +1,4 @@
-"""Reading DICOM files of tests, and where their voxels lie."""
+"""Read DICOM files of tests, and find where their voxels lie."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ def lps_mm(dataset: Dataset) -> NDArray[np.float64]:
 
 
 def error(dataset: Dataset) -> float:
-    """The largest difference to the scene, grey values of some 1000."""
+    """Return the largest difference from the scene, whose grey values reach about 1000."""
     return float(np.abs(whole(dataset) - scene(lps_mm(dataset))).max())
 
 

@@ -16,7 +16,7 @@ SPACING = (2.5, 2.0, 2.2)  # mm between slices, rows, columns
 
 
 def complete(ds: Any) -> None:
-    """Add what a segmentation takes over from its images."""
+    """Add the elements that a segmentation copies from its images."""
     ds.PatientName, ds.PatientID, ds.PatientBirthDate, ds.PatientSex = "DOE^JANE", "J1", "", ""
     ds.StudyID, ds.StudyDate, ds.StudyTime, ds.AccessionNumber = "", "", "", ""
     ds.ReferringPhysicianName = ""
@@ -36,11 +36,11 @@ def write_segmentation(
     """Write `images` and `seg.dcm` to a folder; return the path of the latter.
 
     kind        SegmentationType
-    voxels      (slices, rows, columns, segments), uint8 or, of fractions, 0..1
+    voxels      (slices, rows, columns, segments), uint8, or fractions from 0 to 1
     change      edits the file
     omit_empty  planes without a segment are left out
-    types       by turns; the texts of a segment name JANE
-    affine      of the voxels; None: axial, SPACING apart
+    types       types of the segments, used in turn; the segments' texts contain the name JANE
+    affine      from voxels to LPS in mm; None: axial slices with SPACING
     """
     z, y, x, count = voxels.shape
     affine = grid(shape=(z, y, x), spacing=SPACING) if affine is None else affine

@@ -1,7 +1,7 @@
 """Synthetic DICOM series and NIfTI files of one scene whose every point in the patient is known.
 
-None of this uses stereocell. A grid is an affine (4, 4) for columns from (slice, row, column, 1) to
-LPS in mm; whatever the grid, a voxel holds `scene` at its own place.
+This module does not use stereocell. A grid is an affine (4, 4) that maps a column vector
+(slice, row, column, 1) to LPS in mm. In every grid, a voxel has the value of `scene` at its place.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -29,7 +29,7 @@ from pydicom.uid import (
 
 Affine = NDArray[np.float64]
 Change = Callable[[pydicom.Dataset], None]
-# Bright bodies: centre in LPS mm, width (sigma) mm, height. No mirroring or turn keeps them.
+# Bright bodies: centre in LPS mm, sigma in mm, height. Every mirroring or turn changes them.
 BODIES = (
     ((9.0, -13.0, 7.0), 5.0, 1000.0),  # in front, to the left, above the middle
     ((-12.0, 4.0, -10.0), 4.0, 500.0),
@@ -85,7 +85,7 @@ def grid(
     rotation: NDArray[np.float64] | None = None,
     shift: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Affine:
-    """Return the affine of a grid round the origin. In each plane slice = row x column or minus."""
+    """Return the affine of a grid round the origin. Slices run along row x column or against it."""
     axes = np.array(PLANES[plane], np.float64).T
     if rotation is not None:
         axes = rotation @ axes
@@ -95,10 +95,10 @@ def grid(
     return affine
 
 
-ORIENTATIONS = [  # of stored axes among those of LPS: the axis of each, and its sign
+ORIENTATIONS = [  # for each stored axis, the axis of LPS along which it runs, and the sign
     (order, signs) for order in permutations(range(3)) for signs in product((1, -1), repeat=3)
 ]
-# of them every order of the axes, and every choice of signs, at least once
+# Contains each order of the axes and each choice of signs at least once.
 FEW_ORIENTATIONS = [*ORIENTATIONS[::7], ORIENTATIONS[41]]
 
 
@@ -222,7 +222,7 @@ def write_series(
 ) -> list[Path]:
     """Write one file a slice, in a shuffled order of names; return them by slice.
 
-    indices  which slices; fractions lie between
+    indices  positions of the slices, in slice distances; a fraction lies between two slices
     """
     chosen = list(range(shape[0]) if indices is None else indices)
     order = np.random.default_rng(seed).permutation(len(chosen))
@@ -245,7 +245,7 @@ def write_enhanced(
     modality: str = "MR",
     seed: int | None = 0,
 ) -> Path:
-    """Write an enhanced multi-frame image, its frames in a shuffled order, or as they lie (None).
+    """Write an enhanced multi-frame image; its frames are shuffled, or in spatial order (None).
 
     Orientation and spacing are shared, positions per frame; rescale is per frame: slope k + 1 and
     intercept -10 k of frame k, so that the values are the scene's times that.

@@ -1,4 +1,4 @@
-"""What lies in a folder, to be compared: a hash of every file."""
+"""Hashes of all files in a folder, to compare folders by."""
 
 import hashlib
 from pathlib import Path

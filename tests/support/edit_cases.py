@@ -1,4 +1,4 @@
-"""Edits of a stage as artists make them, and what becomes of each: taken, refused or reported.
+"""Edits of a stage as artists make them, with their outcomes: taken over, refused or reported.
 
 Each edit is made by USD's own API in a layer over the stage of two tiles (`support.bundles`). The
 table in docs/edit-table.md is printed by
@@ -25,10 +25,10 @@ _Types = Sdf.ValueTypeNames
 class EditCase:
     """One edit.
 
-    what    the edit in words, for the table of the docs
-    change  makes it on a stage whose edit target is the artist's layer
-    words   what the line on it says; of a taken edit, what becomes of it
-    is_partial  whether only a part of it is lost
+    what    description of the edit for the table of the docs
+    change  makes the edit on a stage whose edit target is the artist's layer
+    words   text of the line that refuses or reports the edit; for a taken edit, its effect
+    is_partial  whether only a part of the edit is lost
     """
 
     what: str
@@ -89,7 +89,7 @@ def _bind(where: str, strength: str) -> Callable[[Usd.Stage], object]:
 
 
 def define_camera(stage: Usd.Stage, roll_deg: float = 0) -> None:
-    """Add a camera in front of the sphere, 20 um before its middle."""
+    """Add a camera 20 um in front of the sphere's middle."""
     camera = UsdGeom.Camera.Define(stage, "/Specimen/Cameras/close")
     camera.GetPrim().SetDisplayName("Close")
     camera.AddTranslateOp().Set(Gf.Vec3d(10, -5, 24))

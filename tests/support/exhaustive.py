@@ -1,6 +1,6 @@
-"""Sweeps: `make test-exhaustive` runs them whole, `make test` one of each kind.
+"""Sweeps: `make test-exhaustive` runs all of their cases, `make test` one case of each kind.
 
-A test that is marked `exhaustive` runs in the former alone (conftest.py).
+A test that is marked `exhaustive` runs only in `make test-exhaustive` (conftest.py).
 """
 
 import os
@@ -13,7 +13,7 @@ IS_EXHAUSTIVE = bool(os.environ.get("STEREOCELL_EXHAUSTIVE"))
 
 
 def sweep(cases: Iterable[Any], kept: Collection[Any]) -> list[Any]:
-    """Return the cases of a parametrization, all but those of `kept` marked `exhaustive`."""
+    """Return the cases of a parametrization, with all except `kept` marked `exhaustive`."""
     found = list(cases)
     if missing := [case for case in kept if case not in found]:
         raise ValueError(f"kept of a sweep, but none of its cases: {missing}")
@@ -26,5 +26,5 @@ def _marked(case: Any) -> Any:
 
 
 def examples(most: int, few: int) -> int:
-    """Return how many random cases to try: `most` of them, or for `make test` a few."""
+    """Return how many random cases to try: `most` in the sweep, few in `make test`."""
     return most if IS_EXHAUSTIVE else few

@@ -28,7 +28,7 @@ def refused(_: Path, watch: Watch) -> str:
 
 
 def starved(_: Path, watch: Watch) -> str:
-    """End with the lines of two tasks that found no room on the disk."""
+    """End with the lines of two tasks for which the disk had no space."""
     watch("evidence", 0, 2, "")
     no_room = os.strerror(errno.ENOSPC)
     return f"r0_c0/A: out: can't be written: {no_room}\nevidence: 2 of 2 failed"
@@ -41,7 +41,7 @@ def refused_twice(_: Path, watch: Watch) -> str:
 
 
 def refused_once(folder: Path, watch: Watch) -> str:
-    """End with the line of an error, and a second later as a process; the next one is steady."""
+    """Print the line of an error and end a second later; the next build is steady."""
     if (folder / "starts").exists():
         return steady(folder, watch)
     (folder / "starts").write_text("*")
@@ -50,14 +50,14 @@ def refused_once(folder: Path, watch: Watch) -> str:
 
 
 def killed(_: Path, watch: Watch) -> str:
-    """Be killed, as for want of memory."""
+    """Be killed, as the system kills a process when memory runs out."""
     watch("windows", 0, 1, "")
     os.kill(os.getpid(), signal.SIGKILL)
     return ""
 
 
 def endless(folder: Path, watch: Watch) -> str:
-    """Tell the number of the process, and never report a task."""
+    """Write the number of the process, and never report a task."""
     (folder / "build.part").write_text(str(os.getpid()))
     (folder / "build.part").rename(folder / "build")
     while True:

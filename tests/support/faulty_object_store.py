@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import urlsplit
 
-# cut: before anything is done; lost: it is done, and nobody is told
+# cut: the connection ends before the request reaches the store; lost: the store carries out the
+# request, but its answer never arrives; short: half of the answer arrives
 FAULTS = ("500", "503", "slow", "cut", "lost", "short")
 _CODES = {"500": "InternalError", "503": "SlowDown"}
 _HOP = ("connection", "transfer-encoding", "keep-alive")
@@ -19,8 +20,12 @@ _HOP = ("connection", "transfer-encoding", "keep-alive")
 
 @dataclass
 class Faults:
-    """`rate`: share of requests that go wrong; `only`: these kinds; `once`: the next of a method
-    and an address that ends so. `seen` counts them."""
+    """Rules for failing requests; `seen` counts requests by fault.
+
+    rate  share of requests that fail at random
+    only  kinds of random faults
+    once  fault of the next request with this method and this end of the path
+    """
 
     endpoint: str
     rate: float = 0.0
@@ -31,7 +36,7 @@ class Faults:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def draw(self, method: str, path: str) -> str:
-        """Return what is to go wrong with a request, or nothing."""
+        """Return the fault for a request; empty: none."""
         with self.lock:
             fault = self.dice.choice(self.only) if self.dice.random() < self.rate else ""
             for wanted in [each for each in self.once if each[0] == method]:
@@ -85,7 +90,7 @@ class _Proxy(BaseHTTPRequestHandler):
             time.sleep(0.5)
         back = http.client.HTTPConnection(self.target, timeout=60)
         try:
-            # with its Host, which is signed
+            # The client's own Host is sent on, because the signature covers it.
             back.putrequest(self.command, self.path, skip_host=True, skip_accept_encoding=True)
             for name, value in self.headers.items():
                 if name.lower() not in _HOP:

@@ -44,7 +44,7 @@ def write(folder: Path) -> dict[str, Path]:
     )
     light = rng.poisson(60 + 900 * cells).astype(np.uint16)
     scales = [dict.fromkeys("zyx", _UM)]
-    # a test reads the values of a slice from its picture, and leaves out what is blue there
+    # A test reads the values of a slice from its picture, and ignores blue pixels.
     grey = [{"label": "cells", "color": "FFFFFF"}]
     files = {
         "fluorescence": phantoms.write_ome_zarr(

@@ -33,7 +33,7 @@ def read(data):
             assert stored[0] == 0xE1
             arrays.append(meshopt.decode_index_buffer(stored, view["count"], view["byteStride"]))
         else:
-            assert stored[0] == 0xA0  # version 0 of the vertex codec: all that the extension knows
+            assert stored[0] == 0xA0  # version 0 of the vertex codec, the only one of the extension
             rows = meshopt.decode_vertex_buffer(
                 stored, view["count"], view["byteStride"], view.get("filter")
             )
@@ -42,9 +42,9 @@ def read(data):
 
 
 def property_table(data):
-    """Return the document's one property table by EXT_structural_metadata: numbers, enums by name.
+    """Return the one property table of a document, by EXT_structural_metadata.
 
-    Where it has no value by its schema: None.
+    Enums are names, other values numbers. A value that the schema calls missing is None.
     """
     document, _ = read(data)
     binary = data[28 + struct.unpack_from("<I", data, 12)[0] :]

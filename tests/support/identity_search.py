@@ -1,8 +1,8 @@
 """Search a folder for words that must not be in it, in any form that a program may write them.
 
-Forms: as they are (whatever their case), UTF-16 of both byte orders, hex, base64 at each of its
-three alignments. Looked through are names, bytes, and what zip, gzip, zstd, zlib and PNG hold
-packed; the binary layers of USD, whose words are packed, as text.
+Forms: plain in any case, UTF-16 of both byte orders, hex, and base64 at each of its three
+alignments. The search covers names of files, their bytes, and the unpacked content of zip, gzip,
+zstd, zlib and PNG. Binary layers of USD, whose words are packed, are searched as text.
 """
 
 import base64
@@ -40,7 +40,7 @@ def forms(word: str) -> dict[str, re.Pattern[bytes]]:
 
 
 def find(folder: Path, words: list[str], texts: dict[str, str] | None = None) -> list[str]:
-    """Return where words are: `word as form in place`. `texts` are looked through as well."""
+    """Return the places of words, as `word as form in place`. `texts` are searched as well."""
     wanted = [(word, name, p) for word in words for name, p in forms(word).items()]
     hits = []
     given = {name: text.encode() for name, text in (texts or {}).items()}

@@ -1,6 +1,6 @@
-"""Tiles whose solids are known: bodies x brightness x noise x background x share of foreground.
+"""Tiles of known solids: bodies x brightness x noise x background x share of foreground.
 
-What criteria for an iso-value are chosen by, and held to. None of this uses stereocell.
+Criteria for an iso-value are chosen and tested on these tiles. The module does not use stereocell.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 SPACING = (0.28, 0.14, 0.14)  # um, (z, y, x)
 SHAPE = (48, 128, 128)
-BLUR_UM = (0.35, 0.16, 0.16)  # wider along z, as a microscope's
+BLUR_UM = (0.35, 0.16, 0.16)  # um; wider along z, as in a microscope
 HOT_SHARE, READ_NOISE, GAIN, OFFSET = 2e-5, 2.0, 4.0, 100.0
 _EXTENT = (np.array(SHAPE) - 1) * SPACING
 
@@ -24,7 +24,7 @@ Field = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Member:
-    """One tile: `brightest` over dimmest body, `photons` of the dimmest, background's amplitude."""
+    """One tile: ratio of `brightest` to dimmest body, `photons` of the dimmest, background."""
 
     kind: str
     share: float
@@ -57,7 +57,7 @@ def make(member: Member, seed: int) -> tuple[Mask, NDArray[np.uint16]]:
 
 
 def dice(found: Mask, truth: Mask) -> float:
-    """Return twice the common part over the sum of both."""
+    """Return the Dice coefficient: twice the intersection over the sum of both volumes."""
     return float(2 * (found & truth).sum() / max(1, found.sum() + truth.sum()))
 
 
@@ -96,7 +96,7 @@ def _tubes(rng: np.random.Generator, share: float, brightest: float) -> tuple[Ma
 
 
 def _membranes(rng: np.random.Generator, share: float, brightest: float) -> tuple[Mask, Field]:
-    """Walls of 0.56 um between the cells of a Voronoi diagram, walls left out down to the share."""
+    """Return walls of 0.56 um between Voronoi cells; walls are left out to reach the share."""
     count = max(4, int(300 * share))
     centres = rng.uniform(0, 1, (count, 3)) * _EXTENT
     places = np.stack(np.broadcast_arrays(*_axes()), -1).reshape(-1, 3)

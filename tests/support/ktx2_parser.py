@@ -1,4 +1,4 @@
-"""A KTX2 parser of its own, by the specification."""
+"""A KTX2 parser that is independent of the product, written from the specification."""
 
 import struct
 

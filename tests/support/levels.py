@@ -1,4 +1,4 @@
-"""A level that passes all tests of a clear one, from which tests make others."""
+"""A level that passes all tests for clear levels; tests derive other levels from it."""
 
 from stereocell.isosurface.level import Level
 

@@ -2,7 +2,7 @@
 
 python -m support.live_source FILE.ome.tif [SCALE]
 
-SCALE is how many voxels the smallest F's edge of a voxel has; 2 unless it is given.
+SCALE is the number of voxels along each edge of a voxel of the smallest F; 2 by default.
 """
 
 import sys

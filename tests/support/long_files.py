@@ -1,4 +1,4 @@
-"""Files of many tests, none of which is slow: they take 10 to 30 s in all."""
+"""Files that take 10 to 30 s because they have many tests, although none of these is slow."""
 
 from pathlib import Path
 

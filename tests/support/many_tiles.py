@@ -18,11 +18,11 @@ from stereocell.usd.write_tile import LAYER_NAME
 COLUMNS, ROWS, CHANNELS = 22, 11, 70
 
 
-EDGE = 4  # voxels of a tile
+EDGE = 4  # voxels along each edge of a tile
 
 
-# In a process of its own: the peak of this one's memory tells of the tests before. It prints
-# what it saw as JSON; no peak where /proc has none.
+# Runs in a process of its own, because earlier tests raise the peak memory of this process. Prints
+# its findings as JSON; growth_kib is null where /proc has no peak.
 OPEN = """
 import json, re, sys, time
 from pathlib import Path
@@ -87,7 +87,7 @@ def write_many(folder: Path) -> Path:
 
 
 def open_unloaded(stage: Path) -> dict[str, Any]:
-    """Open a stage in a process of its own; return what it saw, how long it took and held."""
+    """Open a stage in a process of its own; return its findings, seconds and growth of memory."""
     run = subprocess.run(
         [sys.executable, "-c", OPEN, str(stage)], capture_output=True, text=True, check=False
     )

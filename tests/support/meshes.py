@@ -40,7 +40,7 @@ def moved(mesh: Mesh, by: tuple[float, float, float]) -> Mesh:
 
 
 def crowd() -> Mesh:
-    """A ball between six others, nearly in touch: whole moves would make them cross."""
+    """Return a ball that six others almost touch; moves of full length would make them cross."""
     one, ways = ball(5.0, 60), 10.01 * np.concatenate([np.eye(3), -np.eye(3)])
     return joined(one, *(moved(one, tuple(way)) for way in ways))
 
@@ -65,13 +65,13 @@ SOUND = {
 
 
 def enclosed_volume(mesh: Mesh) -> float:
-    """The divergence theorem: signed tetrahedra from the origin; positive if wound outwards."""
+    """Return the volume by the divergence theorem; positive if triangles are wound outwards."""
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     return float((a * np.cross(b, c)).sum() / 6)
 
 
 def open_edges(mesh: Mesh) -> int:
-    """Directed edges without their opposite."""
+    """Return the directed edges without an opposite edge."""
     t = mesh.triangles.astype(np.int64)
     edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
     count = len(mesh.positions)
@@ -79,7 +79,7 @@ def open_edges(mesh: Mesh) -> int:
 
 
 def welded(meshes: list[Mesh]) -> Mesh:
-    """Return one mesh of all, with one vertex at each place."""
+    """Join meshes into one that has one vertex at each place."""
     places, number = np.unique(
         np.concatenate([mesh.positions for mesh in meshes]), axis=0, return_inverse=True
     )

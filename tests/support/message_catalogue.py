@@ -21,11 +21,12 @@ from stereocell.read.image import Image
 PACKAGE = Path(stereocell.__file__).parent
 FILE = os.environ.get("STEREOCELL_MESSAGES", "")
 NOTES = "notes"
-Messages = dict[str, dict[str, str]]  # of a module, or NOTES: line or pattern to an example
+# By module and line of code, or by NOTES and the pattern of a note: an example
+Messages = dict[str, dict[str, str]]
 
 
 def _without_values(text: str) -> str:
-    """Return the pattern of a note. Notes that differ in values alone have the same one."""
+    """Return the pattern of a note. Notes that differ only in values have the same pattern."""
     return re.sub(r"'[^']*'|\S*\d\S*", "X", text)
 
 
@@ -36,7 +37,7 @@ class MessageCatalogue:
         self.messages: Messages = {NOTES: {}}
 
     def record(self) -> None:
-        """Record from now on, to the end of this process."""
+        """Start to record; recording ends with this process."""
         StereoCellError.__init__ = self._recording_error(Exception.__init__)
         for noted in (Image, Plan):
             noted.__init__ = self._recording_notes(noted.__init__)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _MARK = b"\xda\xce\xbe\n"
-_NAME_BYTES = 4072  # of a frame's name, padded
+_NAME_BYTES = 4072  # padded length of a frame's name
 _TIME, _POSITION, _DEPTH = 1, 2, 4  # kinds of loops
 
 
@@ -32,10 +32,10 @@ def write_nd2(
     """Write a file, and return the place of each frame's chunk.
 
     tpzcyx   voxels (t, p, z, c, y, x); a frame holds all channels of a plane
-    without  frames that are left out, as an acquisition that ended early leaves them out
+    without  frames that are left out, as in an acquisition that ended early
     about       more fields of the image's metadata
     depth_loop  more fields of the loop along z
-    lights   emission, nm, of channels that then have no colour of their own
+    lights   emission in nm by channel; such a channel has no colour of its own
     """
     times, positions, depth, channels, height, width = tpzcyx.shape
     step, _, side = spacing_um

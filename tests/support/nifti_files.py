@@ -7,7 +7,7 @@ import nibabel
 import numpy as np
 from numpy.typing import NDArray
 
-RAS = np.diag([-1.0, -1.0, 1.0, 1.0])  # to and from LPS
+RAS = np.diag([-1.0, -1.0, 1.0, 1.0])  # LPS to RAS, or RAS to LPS
 
 
 def write(

@@ -1,9 +1,9 @@
-"""A bundle of a label map: closed cells with a table, in two tiles; for the viewer's tests, too.
+"""A bundle of a label map in two tiles, for the viewer's tests, too: closed cells and their table.
 
-`python -m support.object_bundle FOLDER [--wide]` writes it. Cells are balls on a grid, their number
-there is their row, so that a test knows where each is. The last object is in both tiles, a box that
-is cut at their common plane. `--wide`: its label needs 64 bits. `--painted`: the upper half of each
-ball is stained.
+`python -m support.object_bundle FOLDER [--wide]` writes the bundle. Cells are balls on a grid. A
+cell's number on the grid is its row in the table, so a test knows where each cell is. The last
+object is a box in both tiles, cut at their common plane. With `--wide`, the box has a label that
+needs 64 bits. `--painted` stains the upper half of each ball.
 """
 
 import sys
@@ -26,11 +26,11 @@ from stereocell.storage.json_files import compact_json
 
 CHANNEL = "cells"
 TILES = ("r0_c0", "r0_c1")
-WIDTH_UM = 60.0  # of a tile; the second begins where the first ends
+WIDTH_UM = 60.0  # width of a tile; the second tile begins where the first ends
 GRID = (5, 3, 2)  # cells of a tile along x, y, z
 APART_UM = 12.0
 RADIUS_UM = 4.0
-RINGS = (16, 8)  # of a ball, finest first
+RINGS = (16, 8)  # rings of a ball at each level of detail, finest first
 PER_TILE = GRID[0] * GRID[1] * GRID[2]
 COUNT = 2 * PER_TILE + 1
 COLORS = ((0.9, 0.2, 0.1), (0.1, 0.4, 0.9), (0.2, 0.7, 0.2))
@@ -39,7 +39,7 @@ BOUNDS = ((0.0, -46.0, 0.0), (2 * WIDTH_UM, 0.0, 24.0))
 
 
 def center(row: int) -> tuple[float, float, float]:
-    """Where the ball of a row is, um."""
+    """Return the centre of the ball of a row, in um."""
     tile, rest = divmod(row, PER_TILE)
     x, rest = rest % GRID[0], rest // GRID[0]
     y, z = rest % GRID[1], rest // GRID[1]
@@ -85,7 +85,7 @@ def box(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def tile_mesh(tile: int, rings: int, is_painted: bool = False) -> Mesh:
-    """Return a tile's cells, numbered as they come; the piece of the beam is the last."""
+    """Return a tile's cells, numbered from 0 in their order; the piece of the beam is the last."""
     unit, faces = ball(rings)
     rows = range(tile * PER_TILE, (tile + 1) * PER_TILE)
     positions = [RADIUS_UM * unit + center(row) for row in rows]
@@ -108,7 +108,7 @@ def tile_mesh(tile: int, rings: int, is_painted: bool = False) -> Mesh:
 def make_table(is_wide: bool = False, has_organs: bool = False) -> ObjectTable:
     """Return the table: `x_um` grows with x, `CD8` spreads over decades, one value is missing.
 
-    `has_organs`: there are 117 categories, as a whole body has, in colours of nobody's choice.
+    `has_organs` adds 117 categories, as many as a whole body has, without stated colours.
     """
     rows = np.arange(COUNT)
     beam = COUNT - 1
@@ -157,7 +157,7 @@ def make_table(is_wide: bool = False, has_organs: bool = False) -> ObjectTable:
 
 
 def tile_features(table: ObjectTable, tile: str, *, wanted: tuple[str, ...] = ()) -> Features:
-    """Return a tile's objects, with the first column and the wanted ones."""
+    """Return a tile's objects, with the first column and the requested columns."""
     rows = table.rows[tile]
     names = dict.fromkeys((table.columns[0].id, *wanted))
     found = [column for name in names if (column := table.column(name)) is not None]

@@ -14,11 +14,11 @@ from support.object_bundle import ball
 
 CUT_UM = 20.0  # where the second tile begins
 LABELS = (7, 12, 300)  # balls, then the beam
-CENTERS = ((8.0, -10.0, 8.0), (32.0, -10.0, 8.0))  # of the balls
+CENTERS = ((8.0, -10.0, 8.0), (32.0, -10.0, 8.0))  # um, centres of the balls
 RADIUS_UM = 5.0
-BEAM = ((15.0, -4.0, 4.0), (27.0, -2.0, 10.0))  # low and high, x is cut at CUT_UM
+BEAM = ((15.0, -4.0, 4.0), (27.0, -2.0, 10.0))  # um, low and high corner; cut at x = CUT_UM
 TYPES = ("T cell", "vessel")
-COLORS = ((0.2, 0.4, 0.8), (0.8, 0.2, 0.0))  # of the types
+COLORS = ((0.2, 0.4, 0.8), (0.8, 0.2, 0.0))  # one for each type of object
 APPEARANCE = Appearance(
     "cells", (1.0, 1.0, 1.0), (0.0, 255.0), 1.0, 1.0, "clear", {"default": ((0.0, 0.0), (1.0, 1.0))}
 )

@@ -1,4 +1,4 @@
-"""An object store on localhost for tests: versitygw where it is at hand, else moto's server."""
+"""An object store on localhost for tests: versitygw if it is installed, otherwise moto's server."""
 
 import asyncio
 import os
@@ -17,13 +17,13 @@ import s3fs
 from zarr.core.sync import _get_loop as zarr_loop
 
 KEY, SECRET = "tester", "not-a-secret"
-# on the PATH, or beside Python (`make object-store`)
+# Found on the PATH, or beside Python, where `make object-store` installs it.
 VERSITYGW = shutil.which("versitygw", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}")
 
 
 @dataclass(frozen=True)
 class ObjectStore:
-    """`kind`: who answers."""
+    """A running store; `kind` is the name of its server."""
 
     kind: str
     endpoint: str
@@ -88,11 +88,13 @@ def _await_port(server: subprocess.Popen[bytes], port: int) -> None:
 
 
 def _forget_others() -> None:
-    """Let go of kept file systems: they are found by what they were asked, and not by the
-    environment, which says where the store is."""
+    """Close the file systems that s3fs caches by their arguments.
+
+    The cache ignores the environment, which states the address of the store.
+    """
     for fs in list(s3fs.S3FileSystem._cache.values()):
         if fs._s3 is not None:
-            loop = zarr_loop() if fs.asynchronous else fs.loop  # where it was opened
+            loop = zarr_loop() if fs.asynchronous else fs.loop  # the loop in which it was opened
             closing = fs._s3.__aexit__(None, None, None)
             asyncio.run_coroutine_threadsafe(closing, loop).result(30)
     s3fs.S3FileSystem.clear_instance_cache()

@@ -66,7 +66,7 @@ def write_endless_model(path: Path) -> Path:
 
 
 def write_huge_model(path: Path, *, planes: int = 1 << 29) -> Path:
-    """Write a network, of some hundred bytes, with a constant of 8 bytes a plane: 4.3 GB."""
+    """Write a network of some hundred bytes whose constant takes 4.3 GB, 8 bytes per plane."""
     size = numpy_helper.from_array(np.array([1, 2, planes, 1, 1]), "size")
     nodes = [
         helper.make_node("ConstantOfShape", ["size"], ["many"]),

@@ -1,4 +1,4 @@
-"""Write bytes as numcodecs packs them, as JSON, into the file named: the page unpacks them."""
+"""Write a JSON file of bytes that numcodecs packs, for tests of the page, which unpacks them."""
 
 import base64
 import itertools
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 
 def arrays() -> dict[str, NDArray[Any]]:
-    """Values that pack well, badly, and not at all; and fewer than a block has."""
+    """Return values that pack well, badly, and not at all, and fewer values than a block has."""
     rng = np.random.default_rng(1)
     steps = np.cumsum(rng.integers(0, 3, 70_001)).astype(np.uint16)
     return {

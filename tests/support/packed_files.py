@@ -34,7 +34,7 @@ NOISE: NDArray[np.uint16] = np.random.default_rng(0).choice([0, 7, 300, 4000], S
 
 
 class Stream(NamedTuple):
-    """A packed stream of a source: bytes `start` to `stop` of `file`."""
+    """A packed stream of a source, in the bytes `start` to `stop` of `file`."""
 
     source: Path
     file: Path
@@ -184,7 +184,7 @@ def n5_of(folder: Path, compression: dict[str, Any], pack: Callable[[bytes], byt
 
 
 def java_lz4(raw: bytes) -> bytes:
-    """Return a stream of Java's LZ4BlockOutputStream: a packed part, one as it is, and the end."""
+    """Return a stream of Java's LZ4BlockOutputStream: a packed part, a raw part, and the end."""
     parts = b""
     for part, token in ((raw[:1000], 0x26), (raw[1000:], 0x16)):
         packed = part if token == 0x16 else numcodecs.lz4.compress(part)[4:]

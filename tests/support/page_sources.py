@@ -1,4 +1,4 @@
-"""Sources for the page that reads them by itself, and what the pipeline makes of them.
+"""Sources for the page that reads sources without a server, and the pipeline's view of them.
 
     python -m support.page_sources FOLDER [views]
 
@@ -38,7 +38,7 @@ COLORS = ("FF4000", "20C040")
 
 
 def two_boxes() -> NDArray[np.uint16]:
-    """(c, z, y, x): a box on the left below in channel 0, one on the right above in channel 1."""
+    """Return (c, z, y, x): a box at the lower left in channel 0, one at the upper right in 1."""
     rng = np.random.default_rng(5)
     voxels = rng.normal(200, 12, (2, *SHAPE))
     voxels[0, 3:9, 22:36, 6:22] += 1500
@@ -47,7 +47,7 @@ def two_boxes() -> NDArray[np.uint16]:
 
 
 def halved(voxels: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """The means of 2 x 2 voxels in the plane."""
+    """Return the means of 2 x 2 voxels in the plane."""
     c, z, y, x = voxels.shape
     return voxels.reshape(c, z, y // 2, 2, x // 2, 2).mean((3, 5)).astype(np.uint16)
 
@@ -82,7 +82,7 @@ def metadata(version: str, levels: int) -> dict[str, Any]:
 
 
 def write_image(path: Path, version: str, *, compressor: Any, shards: bool = False) -> None:
-    """An image (t, c, z, y, x) of two time points and two levels; only the first has the boxes."""
+    """Write an image (t, c, z, y, x) of two times and two levels; only the first has the boxes."""
     first = two_boxes()
     levels = [first, halved(first)]
     group = zarr.open_group(path, mode="w", zarr_format=2 if version == "0.4" else 3)
@@ -101,7 +101,7 @@ def write_image(path: Path, version: str, *, compressor: Any, shards: bool = Fal
 
 
 def write_sided(path: Path) -> None:
-    """A volume of a body with the sides of RFC-4 and two levels; none of its axes is canonical."""
+    """Write a volume of two levels with the sides of RFC-4; none of its axes is canonical."""
     rng = np.random.default_rng(9)
     fine = rng.normal(60, 9, (24, 40, 56))
     fine[4:14, 8:30, 10:46] += 500
@@ -144,7 +144,7 @@ def write_sided(path: Path) -> None:
 
 
 def write_zipped(folder: Path, path: Path) -> None:
-    """`.ozx` of RFC-9: stored members, the root's metadata first."""
+    """Write the `.ozx` of RFC-9: stored members, with the root's metadata first."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         archive.comment = json.dumps({"ome": {"version": "0.5"}}).encode()
         for file in sorted(folder.rglob("*"), key=lambda one: (one.name != "zarr.json", str(one))):
@@ -153,7 +153,7 @@ def write_zipped(folder: Path, path: Path) -> None:
 
 
 def write_nifti(path: Path) -> None:
-    """A head-like ball of 1.5 mm voxels, turned a little, left-handed as stored, scaled."""
+    """Write a head-like ball of scaled 1.5 mm voxels, turned a little, stored left-handed."""
     x, y, z = np.mgrid[:60, :50, :40]
     ball = ((x - 30) / 22) ** 2 + ((y - 25) / 20) ** 2 + ((z - 20) / 17) ** 2 < 1
     spot = (x - 40) ** 2 + (y - 25) ** 2 + (z - 28) ** 2 < 16
@@ -174,7 +174,7 @@ def write_nifti(path: Path) -> None:
 
 
 def first_view(source: Path) -> dict[str, Any]:
-    """The manifest of the first view, and the voxels and functions of each channel."""
+    """Return the manifest of the first view, and the voxels and functions of each channel."""
     settings, choice = load_for(source, None, None, flags={})
     plan = settle(str(source), settings, choice)
     dataset = open_source(as_asked(plan.source, plan.settings.plan))
@@ -188,7 +188,7 @@ def first_view(source: Path) -> dict[str, Any]:
             volume["voxels"] = base64.b64encode(voxels.tobytes()).decode()
             channel["volume"] = volume
     for channel, planned in zip(manifest["channels"], plan.channels, strict=True):
-        # the rules of a build on all voxels, at the level that the page looks for
+        # The rules of a build on all voxels, at the level that the page chooses.
         voxels = dataset.read(planned.index, dataset.levels[0].box, 0).voxels
         statistics = find_statistics(voxels.copy(), plan.settings.window)
         low, high = statistics.window

@@ -22,7 +22,7 @@ def write_pet(
     series: str = "1.2.3",
     **values: Any,
 ) -> None:
-    """Write slices whose values are the scene's, and `add`, in Bq/ml.
+    """Write slices whose values are the scene's values plus `add`, in Bq/ml.
 
     first   instance number of the first slice
     values  elements by keyword; None: the element is absent; a function gets the slice's number

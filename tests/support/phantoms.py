@@ -1,6 +1,6 @@
 """Bodies whose shape is known from theory, and files of them written by the formats' own libraries.
 
-None of this uses stereocell: it is what the readers are tested against.
+This module does not use stereocell, because the readers are tested against it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,8 +23,8 @@ def f_phantom(scale: int = 1) -> NDArray[np.uint16]:
     """Return a solid letter F, uint16 (z, y, x) = (16, 48, 36) times `scale`.
 
     Seen with x to the right and rows (y) downwards it reads as an F: stem on the left, long arm on
-    top, short arm below it. The foot of the stem alone reaches to high z. No mirroring or turn
-    leaves it as it is.
+    top, short arm below it. Only the foot of the stem reaches to high z. Every mirroring or turn
+    changes the body.
     """
     body = np.full((16, 48, 36), F_BACKGROUND, np.uint16)
     body[4:8, 6:42, 6:13] = F_BODY  # stem
@@ -68,8 +68,8 @@ def seam_scene(step: float = 1.8, height: float = 1000.0) -> NDArray[np.uint16]:
     Each of the 12 faces between two tiles is crossed by a ball with a cavity (8 x 7 x 7 voxels) or
     by two slabs with a gap (5 voxels) between them, and by a fragment (7 x 3 x 3). All three reach
     past the plane by at most 2 voxels on one side and by 4 or 5 on the other. A ball lies where all
-    tiles meet. From tile to tile, bodies and background grow `step` times as bright along each
-    axis; `height` is that of the bodies in the darkest.
+    tiles meet. From tile to tile along each axis, bodies and background become `step` times as
+    bright. `height` is the height of the bodies in the darkest tile.
     """
     size, plane = 2 * SEAM_TILE, SEAM_TILE
     grid = np.indices((size,) * 3)
@@ -102,7 +102,7 @@ def seam_scene(step: float = 1.8, height: float = 1000.0) -> NDArray[np.uint16]:
 def as_counts(
     field: NDArray[np.float32], low: float, high: float, noise: float = 0.0, seed: int = 0
 ) -> NDArray[np.uint16]:
-    """Return a field of 0..1 as uint16 between two levels, with Gaussian noise of that sigma."""
+    """Scale a field of 0..1 to uint16 between two levels, with Gaussian noise of sigma `noise`."""
     counts = low + (high - low) * field
     if noise:
         counts = counts + np.random.default_rng(seed).normal(0.0, noise, field.shape)
@@ -196,9 +196,9 @@ def write_ome_zarr(
 
 
 def write_f_everywhere(folder: Path) -> None:
-    """Write the F in every format: what the viewer's orientation tests are built of.
+    """Write the F in every format, for the viewer's orientation tests.
 
-    f.ome.tif, f.ome.zarr, f.nii.gz, and dicom/, all of the same voxels at the same place.
+    f.ome.tif, f.ome.zarr, f.nii.gz and dicom/ have the same voxels at the same place.
     """
     from support.dicom_series import write_f_dicom, write_f_nifti
 

@@ -18,7 +18,7 @@ NAME, FINGERPRINT = "b" * 2000, "0123456789abcdef" * 4
 
 
 def write(out: Path, files: dict[str, bytes], *, fingerprint: str = FINGERPRINT) -> None:
-    """A bundle of these files: the manifest names the list, which names all but these two."""
+    """Write a bundle; its manifest names the list of files, which names all other files."""
     bundle = out / "bundle"
     for path, content in files.items():
         file = bundle / path
@@ -33,7 +33,7 @@ def write(out: Path, files: dict[str, bytes], *, fingerprint: str = FINGERPRINT)
 
 
 def manifest_of(name: str, index: dict[str, Any], fingerprint: str) -> dict[str, Any]:
-    """A manifest without its hash. An empty fingerprint is left out: the source is not known."""
+    """Return a manifest without its hash. An empty fingerprint states that no source is known."""
     box = {"min": [0, 0, 0], "max": [1, 1, 1]}
     source = {"fingerprint": fingerprint} if fingerprint else {}
     return {
@@ -48,6 +48,6 @@ def manifest_of(name: str, index: dict[str, Any], fingerprint: str) -> dict[str,
 
 
 def below(folder: Path) -> dict[str, bytes]:
-    """All files below a folder, by their relative paths."""
+    """Return all files below a folder by their relative paths."""
     files = (file for file in folder.rglob("*") if file.is_file())
     return {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}

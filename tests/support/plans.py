@@ -42,7 +42,7 @@ def plan_of(
 
 
 def choose(plan: Plan, tiles: Iterable[Mapping[str, Any]]) -> RepairOptions:
-    """What is cleaned of a channel's surface by a plan."""
+    """Return how a plan repairs a channel's surface."""
     return choose_repair(
         tiles, plan.repair, surface=plan.settings.surface, spacing_um=plan.spacing_um
     )

@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def find_layers() -> dict[str, str]:
-    """Return each printed layer by its page and line; every block in `usda` is one."""
+    """Return each printed layer by its page and line; every block of `usda` is a layer."""
     found = {}
     for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
         text = page.read_text("utf-8")
@@ -18,7 +18,7 @@ def find_layers() -> dict[str, str]:
 
 
 def write_layer(layer: str, path: Path, stage: Path, channel: str) -> Path:
-    """Write a printed layer over another stage: its channel is another."""
+    """Write a printed layer over another stage, with that stage's channel."""
     assert "@out/mine/stage/stage.usda@" in layer
     named = layer.replace("out/mine/stage/stage.usda", str(stage)).replace("CD31", channel)
     path.write_text(named)

@@ -22,8 +22,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-MAX_WORDS = 30  # of a sentence
-MAX_AVERAGE_WORDS = 18.0  # of the sentences of a page of docs
+MAX_WORDS = 30  # words in a sentence
+MAX_AVERAGE_WORDS = 18.0  # words in a sentence, averaged over a page of docs
 SHORTEST_MESSAGE = 4  # words; shorter strings of code are names and keys
 NO_SUBJECT = re.compile(
     r"(what|whatever|who|whoever|whose|whom|which|of|those|one more|none of|the same of)\b"
@@ -52,8 +52,8 @@ WORDS = {  # words that readers stumble over, and what to write
 }
 STUMBLES = [(re.compile(rf"\b({old})\b", re.IGNORECASE), new) for old, new in WORDS.items()]
 ALLOWED: dict[str, str] = {}  # file: start of a sentence that may stay; at most ten
-# A sentence ends at a full stop, a blank line, a colon at the end of a line, before an item of a
-# list, and before the row of an argument such as "bins  number of bins"
+# A sentence ends at a full stop, at a blank line, or at a colon that ends a line. It also ends
+# before an item of a list, and before the row of an argument such as "bins  number of bins".
 ENDS = re.compile(
     r"(?<=[.!?])\s+(?=[A-Z`])|\n\s*\n|:\s*\n|\n(?=\s*([-*]|\d+\.) |\s*@|\s*[\w.`,*/= -]+? {2,}\w)"
 )

@@ -1,4 +1,4 @@
-"""A service on loopback that gives recorded answers, and keeps what it was asked."""
+"""A service on loopback that gives recorded answers, and keeps the requests."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -11,7 +11,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer. `length` is what it states; None: as long as it is."""
+    """An answer. `length` is the stated Content-Length; None: the true length."""
 
     body: bytes = b""
     status: int = 200
@@ -53,7 +53,7 @@ class Service:
 
     @property
     def paths(self) -> list[str]:
-        """The paths that were asked for, with their queries."""
+        """The requested paths, with their queries."""
         return [one.path for one in self.asked]
 
 

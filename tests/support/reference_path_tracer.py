@@ -1,9 +1,9 @@
-"""A path tracer of its own, in float64 and numpy, to hold the viewer's against.
+"""A path tracer in float64 and numpy, to compare the viewer's path tracer with.
 
-What the viewer's shader does in another way: one majorant for the whole volume (Woodcock et al.
-1965), no environment sampling, lamps by binary shadow rays; the same medium, the same scattering.
-Reads the run as JSON (viewer_gltf/test/support/pathtrace/harness.ts) on standard input, with
-"paths"; prints mean and standard error of premultiplied colour and coverage over the picture.
+Medium and scattering are those of the viewer's shader. Other parts differ on purpose: one majorant
+for the whole volume (Woodcock et al. 1965), no environment sampling, and lamps by binary shadow
+rays. Reads the run as JSON (viewer_gltf/test/support/pathtrace/harness.ts) on standard input, with
+"paths". Prints mean and standard error of premultiplied colour and coverage over the picture.
 """
 
 import json
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class Medium:
-    """Texels with an apron of one; positions (n, 3) in um from the box's low corner, y up."""
+    """Texels with an apron of one texel; positions (n, 3) in um from the box's low corner, y up."""
 
     def __init__(self, run: dict) -> None:
         nx, ny, nz = run["size"]
@@ -30,7 +30,7 @@ class Medium:
         self.albedo = np.array(run["color"], np.float64)
 
     def intensity(self, p: Array) -> Array:
-        """Trilinear; texture rows run against y."""
+        """Return trilinear intensities, 0..1; texture rows run against y."""
         nz, ny, nx = self.texels.shape
         x = p[:, 0] / self.spacing[0] + 1
         y = (self.edges[1] - p[:, 1]) / self.spacing[1] + 1
@@ -42,7 +42,7 @@ class Medium:
         return np.interp(self.intensity(p) * 255, np.arange(256), self.sigma)
 
     def gradient(self, p: Array) -> Array:
-        """Intensity over two voxels of the finest spacing, central differences."""
+        """Return differences of intensity over two finest voxel spacings, along each axis."""
         parts = []
         for axis in range(3):
             step = np.zeros(3)
@@ -59,7 +59,7 @@ class Medium:
 
 
 def track(medium: Medium, p: Array, d: Array, limit: Array | None, rng) -> Array:
-    """Distance to the next collision; NaN: the ray leaves the box, or passes `limit`."""
+    """Return the distance to the next collision; NaN if a ray leaves the box or passes `limit`."""
     near, far = medium.exit(p, d)
     if limit is not None:
         far = np.minimum(far, limit)
@@ -100,7 +100,10 @@ GLOSS = 60.0
 
 
 def density_of(way, normal, mirrored, g, before: Array, after: Array) -> Array:
-    """Density of going on along `after`; each way is sampled by its own value."""
+    """Return the probability density of scattering from `before` into `after`.
+
+    way  PHASE, DIFFUSE or GLOSSY of each ray: the lobe from which it is sampled
+    """
     k = 1 + g * g - 2 * g * np.sum(before * after, 1)
     phase = (1 - g * g) / (4 * np.pi * k**1.5)
     height = np.sum(after * normal, 1)
@@ -188,7 +191,7 @@ def trace(run: dict) -> dict:
             center = medium.edges / 2 + aside
             radius = 0.08 * edge
             intensity = lamp["strength"] * np.pi * max(aside @ aside, (edge / 4) ** 2)
-            # a point on the sphere's whole surface, by area: only its near half shines here
+            # A point anywhere on the sphere's surface; only the half that faces `q` lights it.
             n = rng.normal(size=(len(live), 3))
             n /= np.linalg.norm(n, axis=1, keepdims=True)
             to = center + radius * n - q

@@ -1,8 +1,9 @@
-"""The picture that the viewer's march is held against: float64, plain, slow, written apart from it.
+"""A plain and slow ray march in float64, independent of the viewer's, to compare pictures with.
 
-Emission and absorption front to back (Max, Optical Models for Direct Volume Rendering, 1995), in
-steps so short that halving them changes nothing that 8 bits show: no skipping, no jitter, no early
-end that could be seen. World axes: x right, y up, z to the viewer; arrays (z, y, x); lengths in um.
+It sums emission and absorption front to back (Max, Optical Models for Direct Volume Rendering,
+1995). Its steps are so short that halving them changes nothing in 8 bits. There is no skipping, no
+jitter, and no visible early end. World axes: x right, y up, z to the viewer; arrays (z, y, x);
+lengths in um.
 """
 
 import itertools
@@ -16,11 +17,11 @@ from scipy import ndimage
 Values = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-RAYS = 1 << 18  # at a time
-CLEAR = 1e-7  # a ray that lets less through ends: a thousandth of what 8 bits show
+RAYS = 1 << 18  # rays that are marched at a time
+CLEAR = 1e-7  # a ray ends below this transmittance, far below what 8 bits show
 ENTRIES = 256
 
-# towards the lamps, from the eye: right, up, back; what a white surface sends on that faces each
+# Directions to the lamps (right, up, back of the eye), and the light of a white surface facing each
 LIGHT: Triple = (-1.2, 1.6, 2.5)
 FILL: Triple = (1.8, -0.4, 1.8)
 LIGHT_COLOR: Triple = (0.66, 0.62, 0.56)
@@ -28,9 +29,9 @@ FILL_COLOR: Triple = (0.08, 0.1, 0.14)
 SKY: Triple = (0.33, 0.34, 0.37)
 GROUND: Triple = (0.13, 0.125, 0.12)
 GLOSS, EXPONENT = 0.1, 16
-SCATTERED = 1.2  # factor of light where there is no boundary
-NOISE_STEP, BOUNDARY_STEP = 0.03, 0.18  # of intensity over two voxels: light fades in between
-FLAT_STEP = 1e-4  # no direction at all
+SCATTERED = 1.2  # factor of the light where there is no boundary
+NOISE_STEP, BOUNDARY_STEP = 0.03, 0.18  # intensity over two voxels; shading fades in between them
+FLAT_STEP = 1e-4  # intensity over two voxels; below it the gradient has no direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """What is looked at: a tile's channels as the bundle holds them.
+    """A tile's channels as the bundle holds them.
 
     channels: 1 to 4 arrays (z, y, x) of uint8, alike in shape, with `apron` voxels beyond the box
         on every side. The box's corners are the centres of the voxels `apron` and n - 1 - `apron`;
@@ -210,7 +211,7 @@ def _march(
     step = np.divide(length, steps, out=np.zeros_like(length), where=steps > 0)
     sums = np.zeros((len(start), 4))
     faces = _faces(block, start + near[:, None] * direction) * (near > 0)[:, None]
-    rays = np.flatnonzero(steps)  # those that go on
+    rays = np.flatnonzero(steps)  # rays that still march
     for k in range(int(steps.max(initial=0))):
         rays = rays[(k < steps[rays]) & (sums[rays, 3] < 1 - CLEAR)]
         points = start[rays] + (near[rays] + (k + 0.5) * step[rays])[:, None] * direction[rays]
@@ -242,9 +243,8 @@ def _faces(block: Block, points: Values) -> Values:
 def _classify(block: Block, intensities: Values, voxels: Values) -> tuple[Values, Values, Values]:
     """Return colour (n, 3), not premultiplied, and opacity (n,) of steps that are `voxels` long.
 
-    Besides, the share (channels, n) of each channel in what is seen.
-
-    Channels absorb together, and share the colour by their opacities.
+    The third value is each channel's share (channels, n) in the colour. Channels absorb together,
+    and share the colour in proportion to their opacities.
     """
     count = intensities.shape[1]
     shares = np.zeros_like(intensities)
@@ -264,8 +264,8 @@ def _classify(block: Block, intensities: Values, voxels: Values) -> tuple[Values
 def _contrast(block: Block) -> Values:
     """Return the factor (channels, 1) to the gradients by which each channel is shaded.
 
-    A table whose opacity reaches half of its most within less than 0.12 of the intensities has
-    boundaries that cross few of them: they count for more, three times at most.
+    If a table's opacity rises to half of its maximum within less than 0.12 of the intensities,
+    boundaries span only a few intensities. Such gradients are scaled up, by a factor of 3 at most.
     """
     factors = []
     for alphas in block.tables[:, :, 3]:
@@ -287,11 +287,12 @@ def _shade(
 ) -> Values:
     """Return the light (n, 3) that is seen at points (n, 3) of a colour (n, 3).
 
-    lamps: (2, 3), towards the lamp and the weaker one. Gradient: differences of the intensities at
-    the corners of a cube of two voxels, each channel by its share. Lit from both sides (Levoy,
-    Display of Surfaces from Volume Data, 1988); what has no direction is lit as if it faced the
-    eye. cut: (n, 3), the normal of the face by which the ray came in, times the share of the light
-    that is as on the face.
+    The gradient is the difference of intensities at the corners of a cube of two voxels, with
+    channels weighted by their shares. Surfaces are lit from both sides (Levoy, Display of Surfaces
+    from Volume Data, 1988). Points without a gradient are lit as if they faced the eye.
+
+    lamps: (2, 3), directions to the lamp and to the weaker one
+    cut: (n, 3), normal of the face through which the ray entered, times the face's share of light
     """
     h = float(block.spacing_um().min())
     weights = shares * _contrast(block)

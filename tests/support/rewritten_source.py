@@ -1,10 +1,10 @@
-"""A command of StereoCell by a source that an update rewrote without another result.
+"""Run a command of StereoCell by code that was rewritten without changing any result.
 
     PYTHONPATH=tests python -m support.rewritten_source [--raise=STEP] build IN -o OUT
 
-Each module of the package gets another comment, docstring and log line, and each function other
-names of its local variables. numba keys compiled loops by their files, so `kernels` stays.
-`--raise=BuildUnit` raises the VERSION of that step besides.
+Each module of the package gets another comment, docstring and log line. Each function gets other
+names for its local variables. `kernels` is not rewritten, because numba keys compiled loops by
+their files. `--raise=BuildUnit` also raises the VERSION of that step.
 """
 
 import ast
@@ -43,7 +43,7 @@ def rewrite(source: str, raised: str = "") -> tuple[str, int]:
 
 
 def _log_line() -> list[ast.stmt]:
-    """Return statements that write a log line. Their name can't hide one of the function."""
+    """Return statements that write a log line, whose names don't occur in the function."""
     line = f"import logging as _new; _new.getLogger({_PACKAGE!r}).debug('called')"
     return ast.parse(line).body
 
@@ -60,7 +60,7 @@ def _functions(tree: ast.Module) -> list[ast.FunctionDef]:
 
 
 def _own_nodes(body: Iterable[ast.AST]) -> Iterator[ast.AST]:
-    """Yield the nodes of a function's body outside of inner scopes."""
+    """Yield the nodes of a function's body, except those in inner scopes."""
     for node in body:
         if not isinstance(node, _INNER):
             yield node
@@ -68,7 +68,7 @@ def _own_nodes(body: Iterable[ast.AST]) -> Iterator[ast.AST]:
 
 
 def _own_variables(function: ast.FunctionDef) -> set[str]:
-    """Return the variables that a function assigns and no inner scope or other statement names."""
+    """Return the variables that a function assigns and that can be renamed safely."""
     own = list(_own_nodes(function.body))
     assigned = {
         node.id for node in own if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
@@ -97,7 +97,7 @@ def _own_variables(function: ast.FunctionDef) -> set[str]:
 
 
 def _first_statement(node: ast.Module | ast.FunctionDef) -> int:
-    """Return the place of the first statement behind the docstring."""
+    """Return the index of the first statement after the docstring."""
     return 0 if ast.get_docstring(node) is None else 1
 
 

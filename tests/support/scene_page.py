@@ -2,7 +2,7 @@
 
     python -m support.scene_page BUNDLE FILE [MAX_MB [VIEW]]
 
-Prints the line about it.
+Prints the line that the export reports.
 """
 
 import sys

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def seal(content: dict[str, Any]) -> dict[str, Any]:
-    """Return the content with the hash that it has now."""
+    """Return the content with the hash of its present values."""
     others = {name: value for name, value in content.items() if name != "sha256"}
     digest = hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
     return {**others, "sha256": digest}

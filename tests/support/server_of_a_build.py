@@ -1,4 +1,4 @@
-"""A process with a build that rests, to be killed: `python -m support.server_of_a_build FOLDER`.
+"""A process with an idle build, to be killed: `python -m support.server_of_a_build FOLDER`.
 
 The number of the build's process is written to FOLDER/build.
 """

@@ -25,7 +25,7 @@ def write_small_viewer(folder: Path) -> Path:
 
 
 def use_small_viewer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let pages in one file be made of a small viewer, written into this folder."""
+    """Make exports of single-file pages use a small viewer, written into this folder."""
     write_small_viewer(folder)
     monkeypatch.setattr(blob_page, "viewer_dist", lambda: folder)
     blob_page.files.cache_clear()

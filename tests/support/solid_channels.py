@@ -20,7 +20,7 @@ COLORS = {"nucleus": (0.1, 0.3, 1.0), "tissue": (0.0, 1.0, 0.0), "vessel": (1.0,
 
 
 def write_solid_channels(folder: Path, *, is_open: bool = False) -> Path:
-    """Write the stage; return its root layer. `is_open`: the vessel has no bottom."""
+    """Write the stage; return its root layer. With `is_open`, the vessel has no bottom."""
     contents = []
     for name, (center, radius) in BALLS.items():
         out, triangles = ball(24)

@@ -1,4 +1,4 @@
-"""Two tiles side by side, a sphere across their border: tiny content for stage and bundle."""
+"""Two tiles side by side with a sphere across their border: tiny content for stage and bundle."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ SPACING = (1.0, 0.5, 0.5)  # um, (z, y, x)
 OWN_SHAPE = (9, 20, 20)
 CENTER = np.array([10.0, -5.0, 4.0])  # on the border of the two tiles
 RADIUS = 3.5
-LEVELS = ((24, 0.02), (16, 0.1), (8, 0.4))  # rings of the sphere, measured distance in um
+LEVELS = ((24, 0.02), (16, 0.1), (8, 0.4))  # per level: rings of the sphere, and its distance in um
 
 RED = Appearance(
     "CD31",
@@ -39,7 +39,7 @@ BLUE = Appearance(
 
 
 def sphere(rings: int, keep: slice) -> Mesh:
-    """Return the half of a UV sphere whose longitudes are in `keep` (of 2 * rings), cut at x = 10.
+    """Return half of a UV sphere, cut at x = 10; `keep` chooses among its 2 * rings longitudes.
 
     The cut edge's vertices are the same floats in both halves.
     """
@@ -78,7 +78,7 @@ def ball(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[n
 
 
 def counts(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[np.uint16]:
-    """Return the same window as a camera of 12 bits counts it: finer than RED's window in 8."""
+    """Return the same window with counts of a 12-bit camera, finer than 8 bits of RED's window."""
     z, y, x = np.indices(shape) + np.reshape(origin, (3, 1, 1, 1))
     return (100 + (977 * z + 131 * y + 29 * x) % 3901).astype(np.uint16)
 
@@ -88,7 +88,7 @@ def tile(
 ) -> TileContent:
     """Return tile r0_c0 (x 0 to 10 um) or r0_c1 (10 to 19.5 um); only CD31 has a surface.
 
-    measured  whether CD31's voxels are those of `counts`, and kept as such
+    measured  whether CD31's voxels are those of `counts`, and the stage keeps them as measured
     """
     lattice = (9, 20, 21) if column == 0 else OWN_SHAPE
     first = (0.0, 0.0, 10.0 * column)

@@ -1,9 +1,9 @@
-"""What the round trip is tried with: a volume whose look is known, and an artist's layer over it.
+"""Input for the round-trip test: a volume of known appearance, and an artist's layer over it.
 
 Six tiles in two rows. Channel `Balls` has a ball in the middle of each, `Slab` a block of one
 intensity, `Sheet` a thin one. The layer recolours the balls, hides one tile and moves the one below
-it into the gap, chooses another transfer function for the sheet and edits the slab's. One tile is
-to be drawn as its volume, one as surface and volume, one at its coarsest level of detail at most.
+it into the gap, chooses another transfer function for the sheet and edits the slab's. It chooses
+the volume for one tile, surface and volume for another, and the coarsest level for a third.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ SPACING_UM = (0.5, 0.5, 0.5)
 TILE = (24, 32, 32)  # voxels (z, y, x)
 COLUMNS, ROWS = 3, 2
 RADIUS_UM = 4.0
-# voxels (z, y, x) of each tile that a block fills
+# Voxels (z, y, x) that a block fills in each tile
 SLAB = (slice(4, 20), slice(4, 28), slice(4, 28))
 SHEET = (slice(11, 13), slice(4, 28), slice(4, 28))
 
@@ -30,7 +30,7 @@ VARIANTS = {
     "r1_c2": ("lod", "lod3"),
 }
 MOVE_UM = (2.0, 7.0, 0.0)
-FUNCTION = "sharp"  # other than the one that a stage of a microscope opens with
+FUNCTION = "sharp"  # not the function with which a microscope's stage opens
 OPACITY_POINTS = ((0.0, 0.0), (0.5, 0.0), (0.51, 0.03), (1.0, 0.03))
 
 
@@ -51,7 +51,7 @@ def write_volume(folder: Path) -> None:
 
 
 def write_layer(path: Path, stage: Path) -> None:
-    """Write the artist's layer; `stage` is relative to it."""
+    """Write the artist's layer; the path `stage` is relative to the layer."""
     layer = Sdf.Layer.CreateNew(str(path))
     layer.subLayerPaths = [f"./{stage.as_posix()}"]
     over = Usd.Stage.Open(layer)

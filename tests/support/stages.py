@@ -1,4 +1,4 @@
-"""A small stage to write and to read back: a letter F, cut into two tiles, and two channels more.
+"""A small stage to write and to read back: a letter F in two tiles, and two more channels.
 
 The first channel, with a Greek letter in its name, is the F; `Hoechst 33342` is a ball on the cut;
 `1st` is empty and has no surface.
@@ -21,14 +21,14 @@ from stereocell.model.volume import zyx_to_xyz
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support.phantoms import F_BACKGROUND, F_BODY, blurred_ball, f_phantom
 
-# how a layer of an artist's begins
+# The beginning of an artist's layer.
 HEAD = '#usda 1.0\n(defaultPrim = "Specimen"\nmetersPerUnit = 1e-6\nupAxis = "Y"\n'
 NAMES = ("CD3\N{GREEK SMALL LETTER EPSILON}", "Hoechst 33342", "1st")
 F_ID, BALL_ID, EMPTY_ID = (to_identifier(name) for name in NAMES)
 COLORS = ((0.8, 0.1, 0.1), (0.1, 0.2, 0.9), (0.1, 0.7, 0.2))
 SPACING_UM = (0.5, 0.25, 0.25)
 SHAPE = (16, 48, 36)
-CUTS = ((0, 18, 19), (18, 36, 36))  # per tile along x: first own, end of own, end of lattice
+CUTS = ((0, 18, 19), (18, 36, 36))  # along x: first and end of own voxels, end of lattice
 TILES = ("r0_c0", "r0_c1")
 FUNCTIONS = {
     "default": ((0.0, 0.0), (0.3, 0.0), (0.5, 0.3), (1.0, 0.8)),
@@ -39,7 +39,7 @@ FUNCTIONS = {
 
 
 def leaf(tile: str, channel: str, suffix: str = "") -> str:
-    """Return the path of a mesh, or of what else ends in `suffix`."""
+    """Return the path of a mesh, or of the prim whose name ends in `suffix`."""
     return f"/Specimen/Tiles/{tile}/{channel}/{channel}_{tile}{suffix}"
 
 

@@ -8,9 +8,9 @@ result? The record, `engine/step_record.json`, says on which code the last decis
 holds the locked versions of the libraries for the same reason.
 
 Code is found from the imports. Comments, docstrings and the layout of lines do not count. NEUTRAL
-modules do not count either, because they can't change a byte of a result: they open and write
-files, distribute tasks, make plans (whose values are part of each result's key), choose a reader,
-or refuse a source.
+modules do not count either, because they can't change a byte of a result. They open and write
+files, distribute tasks, choose a reader, or refuse a source. They also make plans, whose values
+are part of each result's key.
 """
 
 import ast
@@ -57,7 +57,7 @@ NEUTRAL = (
 )
 # modules of neutral packages that read values
 COUNTED = ("stereocell.storage.open_hdf5",)
-# import name of a library -> those of the libraries that it loads by itself; `*`: any ending
+# import name of a library -> names of libraries that it loads at run time; `*`: any ending
 BEHIND = {
     "bioio": ("bioio_*",),
     "pydicom": ("gdcm", "openjpeg", "pylibjpeg"),  # read/formats/dicom/stored_values.py
@@ -95,7 +95,7 @@ def find_steps() -> list[type[Keyed]]:
     for name, file in _modules().items():
         if _STEP.search(file.read_text("utf-8")):
             importlib.import_module(name)
-    # a dataclass with slots is another class than the one that it was made from
+    # `dataclass(slots=True)` makes a second class of the same name.
     steps = {
         (one.__module__, one.__name__): getattr(sys.modules[one.__module__], one.__name__, None)
         for one in (*Keyed.__subclasses__(), *Step.__subclasses__())
@@ -154,7 +154,7 @@ def digest_of(text: str) -> str:
 
 
 def reach(module: str, left_out: Iterable[str] = NEUTRAL) -> tuple[list[Path], list[str]]:
-    """Return our files that a module needs, its own included, and its libraries' names, sorted."""
+    """Return our files that a module needs, with its own file, and the names of its libraries."""
     files: set[Path] = set()
     foreign: set[str] = set()
     seen, waiting = {PACKAGE.name}, [module]
@@ -180,7 +180,7 @@ def reach(module: str, left_out: Iterable[str] = NEUTRAL) -> tuple[list[Path], l
 
 
 def main(arguments: list[str]) -> None:
-    """Compare, or write the record anew."""
+    """Compare the code with the record, or write the record again."""
     found = record()
     if arguments == ["--write"]:
         RECORD.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
@@ -223,7 +223,7 @@ def _assets(tree: ast.Module) -> Iterator[Path]:
 
 
 def _imports(tree: ast.Module) -> Iterator[str]:
-    """Yield the dotted names of all imports, those in functions too."""
+    """Yield the dotted names of all imports, also of those in functions."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -233,7 +233,7 @@ def _imports(tree: ast.Module) -> Iterator[str]:
 
 
 def _libraries(top: str) -> Iterator[str]:
-    """Yield the packages that have an import name, and those that they load by themselves."""
+    """Yield the packages with an import name, and the packages that these load at run time."""
     known = _distributions()
     behind = (fitting(known, pattern) or [pattern] for pattern in BEHIND.get(top, ()))
     for name in (top, *(one for names in behind for one in names)):

@@ -1,7 +1,8 @@
-"""An OUT on object storage whose files leave this machine as soon as they are stored.
+"""An OUT on object storage whose local files are removed as soon as they are stored.
 
 Objects lie in the memory of this process, so a test needs no server. Small files are removed after
-an upload as large ones are. So a file that nobody fetched is missing, as it is for another process.
+an upload, too, which usually happens only to large ones. A file that is not fetched again is
+therefore missing, as it would be for another process.
 """
 
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from stereocell.storage import object_store
 
 @contextmanager
 def emptied() -> Iterator[str]:
-    """Yield the address of a folder that holds nothing yet."""
+    """Yield the address of an empty folder."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(object_store, "_SMALL_BYTES", -1)
         try:

@@ -1,4 +1,4 @@
-"""Where tests lie: tests/ and the viewer's test/ mirror the code, and no test imports another."""
+"""Layout of the tests: tests/ and the viewer's test/ mirror the code; no test imports another."""
 
 import ast
 import re
@@ -14,7 +14,7 @@ TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent
 PACKAGE = ROOT / "pipeline" / "stereocell"
 VIEWER = ROOT / "viewer_gltf"
-# what mirrors no package: of the whole, of other languages and programs, or what tests share
+# Folders that mirror no package: tests of the whole, of other languages and programs, shared code
 OF_THE_WHOLE = {
     "bench", "blender", "corpus", "docs", "malformed", "support", "system", "unity",
 }  # fmt: skip
@@ -22,7 +22,7 @@ OF_THE_PAGE = {"interop", "page", "shaders", "support"}
 
 
 def folders(of: Path) -> set[str]:
-    """Return the folders in which there are files that are kept, by their path."""
+    """Return the paths of the folders that hold source files, without generated ones."""
     generated = {"__pycache__", "node_modules"}
     files = (file.relative_to(of) for file in of.rglob("*") if file.suffix in (".py", ".ts"))
     return {
@@ -33,7 +33,7 @@ def folders(of: Path) -> set[str]:
 
 
 def imported(module: str) -> Iterator[str]:
-    """Yield the names that a Python module imports, those below a package with it."""
+    """Yield the names that a Python module imports; a name from a package includes the package."""
     for node in ast.walk(ast.parse(module)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -42,7 +42,7 @@ def imported(module: str) -> Iterator[str]:
 
 
 def touches_files(module: str) -> Iterator[str]:
-    """Yield what in a Python module reads or writes files by the standard library alone."""
+    """Yield names in a Python module by which the standard library reads or writes files."""
     methods = {"open", "read_bytes", "read_text", "write_bytes", "write_text", "mkdir", "unlink"}
     for node in ast.walk(ast.parse(module)):
         if isinstance(node, ast.Call):
@@ -56,17 +56,17 @@ def touches_files(module: str) -> Iterator[str]:
 
 
 def names_a_test(module: str) -> bool:
-    """Whether a dotted name leads to a test module, or to a folder of tests but the shared one."""
+    """Return whether a dotted name is a test module, or a folder of tests except the shared one."""
     first, *_ = parts = module.strip(".").split(".")
     return any(re.fullmatch(r"test_\w+", part) for part in parts) or first == "tests"
 
 
-# algorithms: what stands left of the bar in docs/architecture.md
+# Algorithms: the packages to the left of the bar in docs/architecture.md
 WITHOUT_FILES = (
     "model", "filters", "transfer", "isosurface", "objects", "meshes", "textures", "tissue",
     "kernels",
 )  # fmt: skip
-OF_COMPILING = {"cache_place.py", "compile_all.py"}  # where numba's results lie, and their making
+OF_COMPILING = {"cache_place.py", "compile_all.py"}  # modules that place and fill numba's cache
 
 
 @pytest.mark.parametrize("package", WITHOUT_FILES)
@@ -85,7 +85,7 @@ def test_an_algorithm_touches_no_file(package: str) -> None:
     "module",
     ["open('a')", "path.read_bytes()", "np.fromfile(x)", "from os import path", "import io"],
 )
-def test_what_touches_files_is_found(module: str) -> None:
+def test_names_that_touch_files_are_found(module: str) -> None:
     assert list(touches_files(module))
 
 
@@ -101,7 +101,7 @@ def test_what_touches_files_is_found(module: str) -> None:
         ("import latest_thing", False),
     ],
 )
-def test_an_import_of_a_test_is_seen(module: str, expected: bool) -> None:
+def test_import_of_a_test_is_found(module: str, expected: bool) -> None:
     assert any(names_a_test(name) for name in imported(module)) == expected
 
 
@@ -144,11 +144,11 @@ def test_folders_of_browser_tests_are_those_of_the_viewer() -> None:
     assert {name.split("/")[0] for name in folders(VIEWER / "test")} >= OF_THE_PAGE
 
 
-def test_files_that_begin_since_they_take_long_exist() -> None:
+def test_long_files_exist() -> None:
     assert [file for file in LONG_FILES if not file.is_file()] == []
 
 
-def test_long_files_begin(request: pytest.FixtureRequest) -> None:
+def test_long_files_run_first(request: pytest.FixtureRequest) -> None:
     files = [TESTS / "filters/test_background.py", TESTS / "isosurface/test_channel_level.py"]
     items = [Mock(path=file, **{"get_closest_marker.return_value": None}) for file in files]
     plugin = request.config.pluginmanager.get_plugin(str(TESTS / "conftest.py"))

@@ -1,4 +1,4 @@
-"""The phantoms themselves: wrong bodies would prove wrong code right."""
+"""The phantoms are tested, too: wrong bodies could make wrong code pass."""
 
 from itertools import permutations, product
 
@@ -30,7 +30,7 @@ def test_blurred_ball_keeps_its_volume_and_is_a_numeric_convolution() -> None:
     voxel = float(np.prod(spacing))
     assert ball.sum() * voxel == pytest.approx(4.0 / 3.0 * np.pi * radius**3, rel=1e-3)
 
-    fine = 4  # samples a voxel and axis
+    fine = 4  # samples of a voxel along each axis
     axes = [
         (np.arange(n * fine) + 0.5) / fine * h - 0.5 * h - c
         for n, h, c in zip(shape, spacing, center, strict=True)

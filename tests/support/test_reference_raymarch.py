@@ -1,4 +1,4 @@
-"""The float64 march against what theory says of simple volumes."""
+"""The float64 ray march agrees with theory on simple volumes."""
 
 from itertools import pairwise
 
@@ -57,8 +57,8 @@ def test_a_ramp_has_its_integral() -> None:
     n, most = 104, 0.3
     ramp = np.clip((np.arange(n) - 1) * 2, 0, 255)
     block = block_of(np.tile(ramp.astype(np.uint8)[:, None, None], (1, 5, 5)), opacity=most)
-    # the opacity of a voxel rises linearly to b, so ln of what is clear is the integral of
-    # ln(1 - b u) over the length
+    # The opacity of a voxel rises linearly to b, so the logarithm of the transmittance is the
+    # integral of ln(1 - b u) over the length.
     b = most * ramp[-2] / 255
     length = 2.0 * (n - 3)
     integral = length * (-(1 - b) * (np.log(1 - b) - 1) - 1) / b
@@ -66,7 +66,7 @@ def test_a_ramp_has_its_integral() -> None:
     assert a == pytest.approx(1 - np.exp(integral), abs=1e-6)
 
 
-def test_nothing_is_drawn_of_an_empty_volume_or_past_the_box() -> None:
+def test_nothing_is_drawn_in_an_empty_volume_or_beside_the_box() -> None:
     empty = block_of(np.zeros((6, 6, 6), np.uint8))
     assert not render(empty, facing(empty, 4, None)).any()
     full = block_of(np.full((6, 6, 6), 255, np.uint8))
@@ -77,7 +77,7 @@ def test_nothing_is_drawn_of_an_empty_volume_or_past_the_box() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shading", [False, True])
-def test_it_converges_as_steps_halve(shading: bool) -> None:
+def test_picture_converges_when_steps_are_halved(shading: bool) -> None:
     block = block_of(smooth(0), smooth(1), opacity=0.5)
     camera = facing(block, 12, fov_deg=25.0)
     pictures = [render(block, camera, step, shading) for step in (1, 1 / 2, 1 / 4, 1 / 8, 1 / 16)]
@@ -99,16 +99,16 @@ def test_overlapping_channels_absorb_together_and_share_the_colour() -> None:
 def test_the_table_is_linear_between_its_entries() -> None:
     volume = np.repeat(np.array([100, 101], np.uint8)[:, None], 12, 1)[:, :, None]
     block = block_of(np.broadcast_to(volume.transpose(2, 1, 0), (5, 12, 2)).repeat(2, 2).copy())
-    assert block.channels[0].shape == (5, 12, 4)  # along x 100 100 101 101: the box is 100..101
+    assert block.channels[0].shape == (5, 12, 4)  # x: 100 100 101 101
     block.tables[0, :, 3] = 0
     block.tables[0, 101, 3] = 0.5
     a = render(block, facing(block), shading=False)[0, 0, 3]
     assert a == pytest.approx(1 - 0.75**4)  # half-way: 0.25 a voxel
 
 
-def test_x_is_right_and_y_is_up_and_the_nearer_covers() -> None:
+def test_x_is_right_y_is_up_and_near_voxels_cover_far_ones() -> None:
     volume = np.zeros((11, 11, 11), np.uint8)
-    volume[5, 2, 8] = 255  # low row index: high in the world; high column: right
+    volume[5, 2, 8] = 255  # a low row is high in the world, a high column is right
     block = block_of(volume, opacity=0.9)
     opacity = render(block, facing(block, 9, None), shading=False)[..., 3]
     assert np.argwhere(opacity == opacity.max()).tolist() == [[1, 7]]
@@ -136,14 +136,15 @@ def test_a_wall_is_lit_by_its_angle_to_the_lamp() -> None:
     volume = np.zeros((12, 9, 9), np.uint8)
     volume[:6] = 255  # faces the eye, and is thick behind its boundary
     block = block_of(volume, opacity=0.999)
-    block.tables[0, :255, 3] = 0  # opaque only at full intensity, where the wall begins
+    block.tables[0, :255, 3] = 0  # only full intensity is opaque; the wall begins there
     plain = render(block, facing(block), shading=False)[0, 0]
     lit = render(block, facing(block), 0.01)[0, 0]
     lamp = 2.5 / np.linalg.norm((1.2, 1.6, 2.5))  # cosines of the angles to both lamps
     weaker = 1.8 / np.linalg.norm((1.8, 0.4, 1.8))
     gloss = 0.1 * np.cos(np.arccos(lamp) / 2) ** 16
     expected = 0.66 * (lamp + gloss) + 0.08 * weaker + (0.33 + 0.13) / 2
-    # the difference over 1 um either side of the first full voxel, whose spacing is 2: 0.5
+    # The spacing is 2 um, so intensity changes by 0.5 from 1 um before the first full voxel to 1 um
+    # behind it.
     assert plain[0] == pytest.approx(plain[3])
     assert lit[0] / lit[3] == pytest.approx(expected, abs=0.02)
 

@@ -1,7 +1,7 @@
-"""Thin sheets and shells of known thickness, sampled by area: what filters must not remove.
+"""Thin sheets and shells of known thickness, which filters must not remove.
 
-None of this uses stereocell. A voxel holds the share of it that the body fills, so that a wall
-thinner than a voxel is partial volume, as in an instrument.
+This module does not use stereocell. A voxel's value grows with the share that the body fills, so a
+wall thinner than a voxel is a partial volume, as in an instrument.
 """
 
 from collections.abc import Iterator
@@ -28,11 +28,11 @@ NORMALS = {
 
 @dataclass(frozen=True)
 class ThinBody:
-    """One body in a volume whose slices lie `ratio` times as far apart as their pixels.
+    """One body in a volume whose slices lie `ratio` times as far apart as pixels.
 
     shape       sphere, box, or one of NORMALS: a flat sheet
-    thickness   of the wall; of a sheet in voxels along its normal, else in finest spacings
-    slice_axis  (of z, y, x) across which the slices lie
+    thickness   of a sheet in voxels along its normal; of other walls in finest spacings
+    slice_axis  index among (z, y, x) of the axis along which slices are stacked
     """
 
     shape: str
@@ -46,7 +46,7 @@ class ThinBody:
         return z, y, x
 
     def voxels(self, noise: float = 0.0) -> NDArray[np.float32]:
-        """Return the voxels (z, y, x), with Gaussian noise of that deviation in voxel values."""
+        """Return the voxels (z, y, x), with Gaussian noise of this deviation in voxel values."""
         values = GROUND + (BODY - GROUND) * self._filled()
         if noise:
             values += np.random.default_rng(0).normal(0.0, noise, values.shape)
@@ -64,7 +64,7 @@ class ThinBody:
         return blocks.mean(axis=(1, 3, 5))
 
     def _inside(self, fine: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
-        """Return which of the samples are in the wall; `fine` are their places in voxels."""
+        """Return which samples are in the wall; `fine` has their places in voxels."""
         if self.shape in NORMALS:
             normal = np.array(NORMALS[self.shape])
             normal /= np.linalg.norm(normal)
@@ -80,7 +80,7 @@ class ThinBody:
 def thin_bodies() -> Iterator[ThinBody]:
     """Yield bodies of all shapes, thicknesses, ratios and slice axes.
 
-    Only the sweep has every axis with each of the others; otherwise the axes alternate.
+    The sweep combines each body with every slice axis; otherwise the axes alternate.
     """
     shapes = ("sphere", "box", *NORMALS)
     cases = product(shapes, (0.5, 1, 1.5, 2, 3), (1, 2, 8))

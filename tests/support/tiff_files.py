@@ -1,4 +1,4 @@
-"""Files of LSM, STK and NDTiff, of which no library at hand writes one: by their published layout.
+"""Write LSM, STK and NDTiff by their published layouts, because no available library writes them.
 
 References: Zeiss, LSM 5 file format; MetaMorph, STK file format (UIC tags 33628 to 33630);
 Micro-Manager, NDTiff specification.
@@ -23,7 +23,7 @@ def write_lsm(
     spacing_um: tuple[float, float, float],
     channels: dict[str, tuple[int, int, int]],
 ) -> Path:
-    """Write a stack (z, c, y, x): a page for each z, each with a thumbnail behind it.
+    """Write a stack (z, c, y, x): a page for each z, each followed by a thumbnail.
 
     channels  name -> colour (sRGB bytes)
     """
@@ -47,7 +47,7 @@ def write_lsm(
             )
     content = bytearray(path.read_bytes())
     at = content.index(bytes(info[:40]))
-    # ChannelColors: sizes, offsets from its start, colours, then each name behind its length
+    # ChannelColors: sizes, offsets from its start, colours, then each name preceded by its length
     colors = b"".join(struct.pack("<4B", *rgb, 0) for rgb in channels.values())
     names = b"".join(struct.pack("<I", len(name) + 1) + name.encode() + b"\0" for name in channels)
     head = struct.pack("<6I", 24 + len(colors) + len(names), count, count, 24, 24 + len(colors), 0)
@@ -59,7 +59,7 @@ def write_lsm(
 def write_stk(
     path: Path, voxels: NDArray[np.uint16], spacing_um: tuple[float, float, float]
 ) -> Path:
-    """Write a stack (z, y, x): one directory, and the planes one behind the other."""
+    """Write a stack (z, y, x): one directory, then the planes one after another."""
     depth, height, width = voxels.shape
     z, y, x = spacing_um
     content = bytearray(b"II*\0\0\0\0\0") + voxels.astype("<u2").tobytes()
@@ -93,7 +93,7 @@ def write_stk(
 
 
 def write_ndtiff(path: Path, voxels: NDArray[np.uint16], channels: list[str]) -> Path:
-    """Write a stack (c, z, y, x), and the index beside it, which alone names the axes."""
+    """Write a stack (c, z, y, x), and the index beside it; only the index names the axes."""
     _, depth, height, width = voxels.shape
     summary = json.dumps({"PixelSize_um": 0.5, "z-step_um": 2.0}).encode()
     content = bytearray(b"II*\0\0\0\0\0")

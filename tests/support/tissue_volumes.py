@@ -10,7 +10,7 @@ Labels = NDArray[np.integer[Any]]
 
 
 def blobs(count: int) -> tuple[NDArray[np.uint16], Labels]:
-    """Return blobs of `count` tissues, 200 apart from 400 on, noise and a bias; air around."""
+    """Return blobs of `count` tissues in air, with values 400, 600, ..., noise and a bias."""
     rng = np.random.default_rng(count)
     shape = (32, 40, 40)
     field = ndimage.gaussian_filter(rng.standard_normal(shape), 5)

@@ -1,14 +1,13 @@
-"""Builds that are killed in each of their phases, and what they leave once they have gone on.
+"""Kill builds in each of their phases, let them go on, and check their results.
 
     PYTHONPATH=tests python -m support.torture [KILLS [SEED]]
 
-A build of two tiles and two channels is killed and started again, over and over, as often in each
-phase as in any other: a kill waits until its phase has begun, and then a random part of the time
-that the phase takes undisturbed. Killed are the command alone, with all its workers, one of its
-workers, the scheduler or a worker of a cluster; of a build whose OUT is a folder, and of one whose
-OUT is on object storage. When it has come to its end, every byte must be as in an undisturbed
-build, no unit or tile that was finished before a kill may have been written again, and nothing half
-written may be left.
+A build of two tiles and two channels is killed and started again, over and over, equally often in
+each phase. A kill waits until its phase has begun, and then for a random part of the time that the
+phase takes undisturbed. It ends the command alone, the command with all its workers, one worker, or
+the scheduler or a worker of a cluster. One build has its OUT in a folder, the other on object
+storage. When a build has ended, every byte must be as in an undisturbed build. No unit or tile that
+was finished before a kill may have been written again, and no half-written file may be left.
 """
 
 import os
@@ -46,7 +45,7 @@ ATTEMPTS = 10
 
 
 class TortureError(AssertionError):
-    """A build did not come back to what it should be."""
+    """A build that went on after a kill did not end as an undisturbed build."""
 
 
 class Place(Protocol):
@@ -59,7 +58,7 @@ class Place(Protocol):
     def environment(self) -> dict[str, str]: ...
 
     def find(self) -> dict[str, object]:
-        """Return every file by its name in OUT, and when it was written."""
+        """Return when each file was written, by the file's name in OUT."""
 
     def digests(self) -> dict[str, str]:
         """Return the SHA-256 of every file."""
@@ -81,7 +80,7 @@ class Folder:
 
     def find(self) -> dict[str, object]:
         found: dict[str, object] = {}
-        for folder, _, files in os.walk(self.out):  # unlike rglob it passes by what was moved since
+        for folder, _, files in os.walk(self.out):  # unlike rglob, skips moved files
             for file in files:
                 path = Path(folder, file)
                 with suppress(FileNotFoundError):
@@ -129,7 +128,7 @@ class Bucket:
 class Torture:
     """A build in one place, which is killed and goes on.
 
-    `outcomes` counts kills by their kind, and ends; `phases` kills by the phase that they fell in.
+    `outcomes` counts kills by kind, and ended builds. `phases` counts kills by phase.
     """
 
     folder: Path
@@ -143,14 +142,14 @@ class Torture:
         self._random = random.Random(self.seed)
         self._source = _write_source(self.folder)
         self._said = self.folder / "stderr"
-        self._finished: dict[str, object] = {}  # files of what is finished: when they were written
+        self._finished: dict[str, object] = {}  # times of the files of finished units and tiles
         self._was: object = None  # survey.json when the build started
         self._undisturbed, self._seconds = self._build_undisturbed()
 
     def kill(self, kind: str, phase: str) -> bool:
-        """Start or go on with the build and kill it in a phase; return whether it came to that.
+        """Start or resume the build and kill it in a phase; return whether it was killed there.
 
-        A build in which that phase is done comes to its end instead.
+        If the phase is already done, the build runs to its end instead.
         """
         is_cluster = kind in ("scheduler", "cluster worker")
         environment = {**os.environ, **self.place.environment}
@@ -171,7 +170,7 @@ class Torture:
                     return False
                 self._random.choice(workers).kill()
             struck = self._phase_of(build)
-            if not struck:  # between two looks it came to its end
+            if not struck:  # the build ended between two checks
                 build.wait(PATIENCE_S)
                 self._require_ended(build)
                 return False
@@ -186,14 +185,14 @@ class Torture:
                 raise TortureError(f"{kind}: 30 s after the command's end there are still {alive}")
         self.outcomes[kind] += 1
         self.phases[struck] += 1
-        if code == 0:  # another worker has done what the killed one was to do
+        if code == 0:  # another worker has done the killed one's task
             self._require_whole()
         else:
             self._remember_finished()
         return struck == phase
 
     def kill_in(self, kind: str, phase: str) -> None:
-        """Kill the build in a phase, however often it has to be begun for that."""
+        """Kill the build in a phase, in as many attempts as that takes."""
         for _ in range(ATTEMPTS):  # on a busy machine a phase may end before its moment
             if self.kill(kind, phase):
                 return
@@ -206,7 +205,7 @@ class Torture:
         self._require_ended(build)
 
     def _build_undisturbed(self) -> tuple[dict[str, str], dict[str, float]]:
-        """Return what it leaves, and the seconds of each phase."""
+        """Return the digests of the build's assets, and the seconds of each phase."""
         build = self._start(self._own_workers())
         seconds = dict.fromkeys(PHASES, 0.0)
         last = time.monotonic()
@@ -238,7 +237,7 @@ class Torture:
             )
 
     def _phase_of(self, build: subprocess.Popen[bytes]) -> str:
-        """Return the phase that the build is in, by what it has said and written; empty: none."""
+        """Return the phase of the running build, by its lines and files; empty: none."""
         said = self._said.read_text(errors="replace")
         for done, phase in (("bundle", "report"), ("stage", "bundle"), ("units", "stage")):
             if re.search(rf"^{done}: (\d+\.\d s|up to date)$", said, re.MULTILINE):
@@ -279,7 +278,7 @@ class Torture:
         self.place.clear()
 
     def _require_written_once(self, now: dict[str, object]) -> None:
-        def look(name: str) -> object:  # the bundle's parts go when it is whole
+        def look(name: str) -> object:  # a whole bundle has no parts left
             gone = self._finished[name] if name.startswith("bundle_parts/") else None
             return now.get(name, gone)
 
@@ -300,24 +299,27 @@ class Torture:
 
 
 def kills_of(count: int, places: Sequence[str]) -> Iterator[tuple[str, str, str]]:
-    """Yield place, kind and phase of each kill: every phase in its order, place by place, so that
-    one build is killed in all; every kind in every phase."""
+    """Yield place, kind and phase of each kill.
+
+    Phases follow one another at one place, so one build is killed in all of them. Then comes the
+    next place. With enough kills, every phase sees every kind.
+    """
     for number in range(count):
         turn, phase = divmod(number, len(PHASES))
         kind = KINDS[(turn // len(places) + phase) % len(KINDS)]
-        if kind == "worker" and PHASES[phase] == "plan":  # it has none
+        if kind == "worker" and PHASES[phase] == "plan":  # `plan` has no workers
             kind = "command"
         yield places[turn % len(places)], kind, PHASES[phase]
 
 
 def kill_session(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process and what it has started, at once."""
+    """Kill a process and all processes that it started, at once."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
 
 
 def asset_digests(out: Path) -> dict[str, str]:
-    """Return the SHA-256 of every asset; without seconds."""
+    """Return the SHA-256 of every asset, except files of measured seconds."""
     return of_assets(digests_of(out))
 
 
@@ -336,10 +338,10 @@ def _write_source(folder: Path) -> Path:
 
 
 def _await_workers_of(build: subprocess.Popen[bytes]) -> list[psutil.Process]:
-    """Return the processes that do the units, once there are some; none: the build has ended."""
+    """Wait for a build's worker processes and return them; none if the build has ended."""
     command = psutil.Process(build.pid)
     while build.poll() is None:
-        with suppress(psutil.Error):  # one has ended since
+        with suppress(psutil.Error):  # a process has ended since
             if workers := workers_of(command):
                 return workers
         time.sleep(0.02)

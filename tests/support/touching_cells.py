@@ -1,4 +1,4 @@
-"""Cells that touch, with truth: each is what lies nearest to its centre, within a ball round it."""
+"""Touching cells of known shape: points nearest to a cell's centre, within a ball round it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ def touching_cells(
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return labels (z, y, x) and the cells' centres (n, 3), um, (z, y, x).
 
-    Two cells' wall is the plane midway between their centres; the free wall of one is a sphere.
+    The interface of two cells is the plane midway between their centres; free surfaces are spheres.
     """
     spacing = np.array(spacing_um)
     box = (np.array(shape) - 1) * spacing

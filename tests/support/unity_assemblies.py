@@ -1,4 +1,4 @@
-"""Assemblies of the Unity package, and of what stands in for Unity's own, compiled by Mono."""
+"""Compile the Unity package's assemblies, and stubs of Unity's own, by Mono."""
 
 import subprocess
 from pathlib import Path
@@ -7,11 +7,11 @@ from support.unity_meta import PACKAGE, SAMPLES
 
 HERE = Path(__file__).parents[1] / "unity"
 STUBS = HERE / "stubs"
-NEWTONSOFT = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")  # Debian's
-ZIP = "System.IO.Compression.FileSystem.dll"  # of Mono; Debian has it in a package of its own
+NEWTONSOFT = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")  # place in Debian
+ZIP = "System.IO.Compression.FileSystem.dll"  # part of Mono, in a separate package of Debian
 
-# Assembly: its scripts, and the assemblies that it sees. Those of the package see what their
-# .asmdef names.
+# Scripts of each assembly, and the assemblies that it may use. Assemblies of the package may use
+# those that their .asmdef names.
 ENGINE = ("UnityEngine",)
 EDITOR = (*ENGINE, "UnityEditor", NEWTONSOFT.stem)
 ASSEMBLIES: dict[str, tuple[list[Path], tuple[str, ...]]] = {
@@ -43,9 +43,9 @@ ASSEMBLIES: dict[str, tuple[list[Path], tuple[str, ...]]] = {
 def compile_assembly(
     folder: Path, name: str, *defines: str, kind: str = "library", blind: tuple[str, ...] = ()
 ) -> None:
-    """Compile an assembly into a folder where those that it sees are already.
+    """Compile an assembly into a folder that already has the assemblies that it uses.
 
-    blind  assemblies that it is kept from seeing
+    blind  assemblies that are hidden from it
     """
     sources, seen = ASSEMBLIES.get(name, ([HERE / "Harness"], (*ASSEMBLIES, NEWTONSOFT.stem)))
     seen = tuple(each for each in seen if each not in blind)
@@ -53,7 +53,7 @@ def compile_assembly(
         f for source in sources for f in (source.rglob("*.cs") if source.is_dir() else [source])
     ]
     out = folder / f"{name}.{'exe' if kind == 'exe' else 'dll'}"
-    # Unity 2022.3 takes C# 9; Mono's compiler knows 7
+    # Unity 2022.3 takes C# 9, but Mono's compiler only C# 7.
     done = subprocess.run(
         [
             *("mcs", "-langversion:7", "-warnaserror", f"-target:{kind}", f"-out:{out}"),

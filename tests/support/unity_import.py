@@ -1,4 +1,4 @@
-"""What the harness prints of an import into Unity, and where the specimen has the same things."""
+"""Read the harness's report of an import into Unity, and map the specimen's places into Unity."""
 
 import base64
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ def child(of: Any, *names: str) -> Any:
 def boxes(root: Any) -> Iterator[tuple[str, Any]]:
     for tile in root["children"]:
         for box in child(tile, "volume").get("children", []):
-            # a property block is stronger than the material
+            # A property block overrides the material.
             yield tile["name"], {**box, "material": {**box["material"], **box.get("block", {})}}
 
 

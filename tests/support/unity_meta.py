@@ -1,8 +1,8 @@
-"""The .meta files of the Unity package: an asset of a package without one is left out by Unity.
+"""Write the .meta files of the Unity package. Unity ignores an asset of a package without one.
 
     PYTHONPATH=tests python -m support.unity_meta
 
-writes those that are missing. An asset's GUID is that of its path, so that it stays the same.
+writes the missing ones. An asset's GUID is computed from its path, so it stays the same.
 """
 
 import hashlib

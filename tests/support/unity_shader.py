@@ -1,6 +1,6 @@
-"""The Unity package's shader, compiled as HLSL by glslang, and drawn with: as WebGL, in Chromium.
+"""Compile the Unity package's shader as HLSL by glslang, and draw with it as WebGL in Chromium.
 
-What Unity's own include gives stands in tests/unity/unity_shaders.
+tests/unity/unity_shaders stands in for Unity's include files.
 """
 
 import base64
@@ -30,7 +30,7 @@ def has_compiler() -> bool:
 
 
 def chromium() -> str | None:
-    """Return the browser, if it and all else that draws is there."""
+    """Return the browser, if all programs for drawing are installed."""
     found = os.environ.get("CHROMIUM") or shutil.which("chromium")
     tools = all(shutil.which(name) for name in ("node", "spirv-cross", "glslangValidator"))
     return found if tools and (VIEWER / "node_modules" / "playwright-core").is_dir() else None
@@ -49,7 +49,7 @@ def program(pipeline: str = "builtin", shader: Path = SHADER) -> str:
 def compile_stage(
     stage: str, folder: Path, *defines: str, pipeline: str = "builtin", shader: Path = SHADER
 ) -> Path:
-    """Return the SPIR-V of a stage. Raises CalledProcessError with the compiler's words."""
+    """Return the SPIR-V of a stage. Raises CalledProcessError with the compiler's output."""
     source, out = folder / f"pass_of_{pipeline}.hlsl", folder / f"{pipeline}_{stage}.spv"
     source.write_text(program(pipeline, shader))
     subprocess.run(
@@ -71,9 +71,9 @@ def cross(spirv: Path, *options: str) -> str:
 
 
 def view_of(camera: Camera, middle: NDArray[np.float64], scale: float) -> dict[str, Any]:
-    """Return what Unity hands to shaders, of a camera in the specimen (um), which is mirrored.
+    """Return the values that Unity gives to shaders for a camera in the mirrored specimen (um).
 
-    middle, scale: where the specimen's root is, um, and world units of a um.
+    middle, scale: place of the specimen's root in um, and world units per um.
     """
     assert camera.fov_deg is not None
     mirror = np.array([-1.0, 1.0, 1.0])
@@ -116,7 +116,7 @@ def filled(block: dict[str, Any], values: dict[str, Any]) -> str:
     for member in block["members"]:
         value = np.array(values.get(member["name"], 0.0), np.float32)
         if member["type"] == "mat4":
-            value = value.T  # column by column
+            value = value.T  # matrices are stored column by column
         found = value.tobytes()
         data[member["offset"] : member["offset"] + len(found)] = found
     return base64.b64encode(data).decode()
@@ -136,7 +136,7 @@ def draw(
     """
     spirv = {stage: compile_stage(stage, folder, *defines, pipeline=pipeline) for stage in STAGES}
     glsl = {stage: cross(path, "--es", "--version", "300") for stage, path in spirv.items()}
-    # stages of WebGL agree by names
+    # WebGL matches the variables of two stages by name.
     for out, into in re.findall(r"out \w+ (_\w+?_(\w+));", glsl["vert"]):
         glsl["vert"] = re.sub(rf"\b{out}\b", f"v_{into}", glsl["vert"])
         glsl["frag"] = re.sub(rf"\bi_{into}\b", f"v_{into}", glsl["frag"])

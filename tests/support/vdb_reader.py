@@ -1,4 +1,4 @@
-"""A VDB reader of its own, by the format's description."""
+"""A VDB reader that is independent of the product, written from the format's description."""
 
 import struct
 import zlib
@@ -48,9 +48,9 @@ class Reader:
         return items
 
     def values(self, count: int) -> tuple[float, ...]:
-        """Active values only (code 0), packed unless the size is negative.
+        """Read values with code 0, active values only; they are packed unless the size is negative.
 
-        OpenVDB leaves the size out where there are no halves, and not where there are no floats.
+        OpenVDB leaves out the size if there are no values in half precision, but not for floats.
         """
         assert self.take("b") == 0
         if count == 0 and self.is_half:
@@ -63,7 +63,7 @@ class Reader:
 
 
 def read_vdb(path: Path, name: str = "density") -> Vdb:
-    """Read the one grid of a file, or of two the one of that name."""
+    """Read the only grid of a file, or the grid of this name if there are two."""
     r = Reader(path.read_bytes())
     magic, version, major, _, has_offsets = r.take("qIII?")
     assert (magic, version, major, has_offsets) == (0x56444220, 224, 12, True)
@@ -119,7 +119,7 @@ def read_grid(r: Reader, uuid: str) -> tuple[str, Vdb]:
 
 
 def value_at(vdb: Vdb, position_um: tuple[float, float, float]) -> float:
-    """The value of the voxel whose centre lies at a world position."""
+    """Return the value of the voxel whose centre lies at a world position."""
     index = (np.array(position_um) - vdb.offset_um) / vdb.scale_um
     assert np.allclose(index, np.rint(index), atol=1e-4)
     i, j, k = (int(n) for n in np.rint(index))

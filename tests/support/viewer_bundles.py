@@ -1,7 +1,7 @@
-"""The bundles that the viewer's tests open: `python -m support.viewer_bundles FOLDER [--deep]`.
+"""Make the bundles of the viewer's tests: `python -m support.viewer_bundles FOLDER [--deep]`.
 
-One process makes them all, since each command would wait for the same imports and kernels, and no
-report, which nobody looks at here. What `make demo` makes is not among them.
+One process makes them all, because each command would wait for the same imports and kernels. It
+makes no reports. The bundle of `make demo` is not among them.
 """
 
 import shutil
@@ -19,13 +19,13 @@ ALONE = ("--workers", "0")
 
 
 def run(*arguments: Path | str) -> None:
-    """Run a command. Ends the process where it fails."""
+    """Run a command. Ends the process if the command fails."""
     if code := main([str(one) for one in arguments]):
         sys.exit(code)
 
 
 def make(source: Path, out: Path, grid: str, *plan: str) -> None:
-    """Make a bundle. Ends the process where it fails."""
+    """Make a bundle. Ends the process if that fails."""
     if code := make_assets(source, out, grid, *ALONE, plan=plan):
         sys.exit(code)
 
@@ -38,21 +38,21 @@ def make_sample(name: str, file: Path, *flags: str) -> Path:
 
 
 def make_half(folder: Path) -> None:
-    """Half of the demo's tiles."""
+    """Make a bundle of half of the demo's tiles."""
     file = make_sample("cycif", folder / "samples" / "half.ome.zarr", "--grid", "5x1")
     make(file, folder / "half", "5x1", "--preset", "cycif")
     run("check", folder / "half", *ALONE)
 
 
 def make_brain_cells(folder: Path, *deep: str) -> None:
-    """Real cells, with baked maps."""
+    """Make a bundle of real cells, with baked maps."""
     file = make_sample("brain-cells", folder / "samples" / "brain-cells.ome.tif")
     make(file, folder / "brain-cells", "2x2", "--preset", "lightsheet", "--maps")
     run("check", folder / "brain-cells", *deep, *ALONE)
 
 
 def make_letters(folder: Path) -> None:
-    """The same letter from each kind of source."""
+    """Make bundles of the same letter from each kind of source."""
     shutil.rmtree(folder, ignore_errors=True)
     write_f_everywhere(folder)
     for name in ("f.ome.tif", "f.ome.zarr", "f.nii.gz", "dicom"):
@@ -60,7 +60,7 @@ def make_letters(folder: Path) -> None:
 
 
 def make_edited(folder: Path) -> None:
-    """A bundle before and after an artist's edits of its stage."""
+    """Make a bundle before and after an artist's edits of its stage."""
     shutil.rmtree(folder, ignore_errors=True)
     write_volume(folder)
     make(folder / "balls.ome.tif", folder / "built", "3x2")
@@ -70,7 +70,7 @@ def make_edited(folder: Path) -> None:
 
 
 def make_forms(folder: Path) -> None:
-    """A scene each of fluorescence, CT and MR, drawn in every form."""
+    """Make bundles of one scene each of fluorescence, CT and MR."""
     shutil.rmtree(folder, ignore_errors=True)
     for name, file in form_scenes.write(folder / "sources").items():
         make(file, folder / name, "1x1", "--preset", form_scenes.PRESETS[name])
@@ -79,7 +79,7 @@ def make_forms(folder: Path) -> None:
 if __name__ == "__main__":
     place = Path(sys.argv[1])
     (place / "samples").mkdir(parents=True, exist_ok=True)
-    if not IS_EXHAUSTIVE:  # which has the whole demo's
+    if not IS_EXHAUSTIVE:  # the sweep opens the whole demo
         make_half(place)
     make_brain_cells(place, *sys.argv[2:])
     make_letters(place / "f")

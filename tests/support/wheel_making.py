@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def build_package(kind: str, checkout: Path, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Build a `wheel` or an `sdist` of the checkout into the folder, without any other program."""
+    """Build a `wheel` or an `sdist` of the checkout into the folder, with an empty PATH."""
     command = [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)]
     ours = ("PYTHONPATH", "VIRTUAL_ENV", "PYTHONHOME")
     environment = {name: value for name, value in os.environ.items() if name not in ours}
@@ -28,8 +28,9 @@ def build_package(kind: str, checkout: Path, folder: Path) -> subprocess.Complet
 def take_compiled(kernels: Path, cache: Path) -> None:
     """Copy the checkout's compiled kernels to the cache of another installation.
 
-    To compile them takes half a minute. numba finds them by the folder and times of the sources, so
-    the installed sources get the times of the checkout. It compiles the kernels that it can't find.
+    Compiling takes half a minute. numba finds kernels by the folder and the times of the sources,
+    so the installed sources get the times of the checkout. numba compiles the kernels that it
+    can't find.
     """
     ours = ROOT / "pipeline" / "stereocell" / "kernels"
     name = f"kernels_{hashlib.sha1(str(kernels).encode()).hexdigest()}"

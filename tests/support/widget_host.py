@@ -26,7 +26,7 @@ class LineComm(BaseComm):
     ) -> None:
         if msg_type == "comm_open" and "_esm" not in data["state"]:
             self.publish_msg = lambda *_, **__: None  # type: ignore[method-assign]
-            return  # the layout, a widget by itself
+            return  # the layout is a widget of its own
         packed = [base64.b64encode(bytes(one)).decode() for one in buffers or ()]
         print(json.dumps({"type": msg_type, "data": data, "buffers": packed}), flush=True)
 
@@ -35,7 +35,7 @@ def main() -> None:
     comm.create_comm = LineComm
     import stereocell
 
-    viewer = stereocell.show(sys.argv[1], height=240)  # software draws it
+    viewer = stereocell.show(sys.argv[1], height=240)  # pixels; small, as software draws it
     for line in sys.stdin:
         told = json.loads(line)
         if "run" in told:

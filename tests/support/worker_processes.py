@@ -2,11 +2,11 @@
 
 import psutil
 
-_SERVER = "multiprocessing.forkserver"  # in the command line of the server, and of what it forks
+_SERVER = "multiprocessing.forkserver"  # in the command lines of the server and its forks
 
 
 def workers_of(command: psutil.Process) -> list[psutil.Process]:
-    """Return the processes that do a command's tasks. Raises psutil.Error where one has ended."""
+    """Return the processes that run a command's tasks. Raises psutil.Error if one has ended."""
     return [one for one in command.children(recursive=True) if _is_worker(one)]
 
 

@@ -17,7 +17,7 @@ def double(value: int) -> int:
 
 def die(value: int) -> int:
     if value == 1:
-        os._exit(9)  # as when the system takes a process's memory back
+        os._exit(9)  # as if the system killed the process for want of memory
     return value
 
 
@@ -36,7 +36,7 @@ def die_beside_others(task: tuple[Path, int]) -> int:
 
 
 class Unpicklable(Exception):
-    """An error whose pickled form can't be read back: its class wants two arguments."""
+    """An error whose pickled form can't be read back, because its class needs two arguments."""
 
     def __init__(self, first: str, second: str) -> None:
         super().__init__(f"{first} {second}")
@@ -53,7 +53,7 @@ def wait_for_ever(begun: Path) -> None:
 
 
 def write_for_ever(file: Path) -> None:
-    """Finish one file, and stay in the middle of the next one, and of a folder."""
+    """Finish one file, then wait for ever in the middle of another file and a folder."""
     from stereocell.storage.atomic_write import replacing, replacing_folder, write_bytes
 
     write_bytes(file.with_name(f"{file.name}.whole"), b"finished")

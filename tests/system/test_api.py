@@ -1,4 +1,4 @@
-"""`stereocell.build` from Python does what the command does."""
+"""`stereocell.build` in Python does the same as the command."""
 
 import inspect
 import re
@@ -17,7 +17,9 @@ from support.digests import digests_of
 
 
 @pytest.mark.slow
-def test_build_is_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_build_does_what_the_command_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", phantoms.f_phantom()[None], "CZYX")
     built = stereocell.build(source, tmp_path / "a", settings={"plan": {"grid": "2x1"}})
     assert built.stage == f"{tmp_path}/a/stage/stage.usda"
@@ -27,10 +29,10 @@ def test_build_is_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert main(command) == 0
     told = capsys.readouterr().err
     for phase in ("plan", "units", "stage", "bundle", "report"):
-        assert f"{phase}: up to date" in told  # there is nothing that the command would do else
+        assert f"{phase}: up to date" in told  # the command finds nothing left to do
 
 
-def test_what_is_wrong_is_an_error_of_one_line(tmp_path: Path) -> None:
+def test_wrong_arguments_raise_an_error_of_one_line(tmp_path: Path) -> None:
     with pytest.raises(stereocell.StereoCellError, match=r"none.ome.tif: not found") as raised:
         stereocell.build(tmp_path / "none.ome.tif", tmp_path / "out")
     assert "\n" not in str(raised.value)
@@ -53,7 +55,7 @@ def test_what_is_wrong_is_an_error_of_one_line(tmp_path: Path) -> None:
         ({"out": None}, "out is None, expected a path or an address"),
     ],
 )
-def test_an_argument_of_another_kind_is_named(
+def test_argument_of_a_wrong_type_is_named(
     tmp_path: Path, arguments: dict[str, Any], line: str
 ) -> None:
     with pytest.raises(stereocell.StereoCellError, match=f"^{re.escape(line)}"):
@@ -61,7 +63,7 @@ def test_an_argument_of_another_kind_is_named(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_source_is_read_where_it_is_asked_for(tmp_path: Path) -> None:
+def test_source_is_read_from_the_given_place(tmp_path: Path) -> None:
     body = phantoms.f_phantom()
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", body[None], "CZYX")
     dataset = stereocell.open_volume(source)
@@ -73,7 +75,7 @@ ARRAY = np.arange(4 * 8 * 8, dtype=np.uint16).reshape(4, 8, 8)
 
 
 @pytest.mark.parametrize("name", ["build", "show", "show an array"])
-def test_functions_that_write_leave_the_files_of_others_and_name_their_own_argument(
+def test_functions_that_write_keep_foreign_files_and_name_their_argument(
     tmp_path: Path, name: str
 ) -> None:
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", phantoms.f_phantom()[None], "CZYX")
@@ -93,7 +95,7 @@ def test_functions_that_write_leave_the_files_of_others_and_name_their_own_argum
     assert digests_of(tmp_path) == before
 
 
-def test_error_of_a_later_phase_names_the_argument_too(
+def test_error_of_a_later_phase_also_names_the_argument(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:

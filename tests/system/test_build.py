@@ -1,4 +1,4 @@
-"""Whole builds of small phantoms, by the command line, held against what the phantoms are."""
+"""Whole builds of small phantoms by the command line agree with the phantoms' known shapes."""
 
 import json
 import shutil
@@ -45,7 +45,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-def test_build_leaves_everything(built: Path) -> None:
+def test_build_leaves_all_results(built: Path) -> None:
     parts = ("stage/stage.usda", "stage/specimen.usdz", "report/index.html")
     for name in ("plan.json", "provenance.json", *parts):
         assert (built / name).is_file(), name
@@ -71,8 +71,9 @@ def test_f_is_upright_and_not_mirrored_in_the_composed_stage(built: Path) -> Non
             matrix = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)
             points += [matrix.Transform(p) for p in UsdGeom.Mesh(prim).GetPointsAttr().Get()]
     x, y, z = np.array(points).T
-    # um: x 0.2, y 0.2, z 0.5 a voxel; stem voxels 6..13, arms to 30, rows 6..42, foot from plane 8
-    # half-way between the last voxel outside and the first inside, to about half a voxel
+    # A voxel is 0.2 um along x and y, and 0.5 um along z. The stem has voxels 6..13, and arms end
+    # at 30. Rows are 6..42, and the foot starts at plane 8. The surface is half-way between the
+    # last voxel outside and the first inside, to half a voxel.
     assert 5.5 * 0.2 - 0.11 < x.min() < 5.5 * 0.2 + 0.11
     assert 29 * 0.2 - 0.2 < x.max() < 30 * 0.2 + 0.2
     assert -42 * 0.2 - 0.2 < y.min() < -41 * 0.2 + 0.2
@@ -106,7 +107,8 @@ def asset_digests(out: Path) -> dict[str, str]:
         name: digest
         for name, digest in digests_of(out).items()
         if name.startswith(("units/", "stage/", "bundle/"))
-        and not name.endswith(("seconds.json", "plan.key"))  # the second: where the source lies
+        # plan.key depends on the place of the source.
+        and not name.endswith(("seconds.json", "plan.key"))
     }
 
 
@@ -115,7 +117,7 @@ def asset_digests(out: Path) -> dict[str, str]:
 def test_number_of_workers_does_not_change_the_bytes(
     built: Path, tmp_path: Path, workers: str
 ) -> None:
-    # one command, whose phases have the same workers: to start them takes longest
+    # One command shares workers between phases, because starting them takes longest.
     told = ["-o", str(tmp_path / "out"), "--grid", "2x1", "--workers", workers]
     assert main(["build", str(_source(tmp_path)), *told]) == 0
     assert asset_digests(tmp_path / "out") == asset_digests(built)
@@ -171,7 +173,7 @@ def test_lost_unit_alone_is_built_again(built: Path, tmp_path: Path) -> None:
     assert (kept / "unit.json").stat().st_mtime_ns == stamp
 
 
-def test_given_iso_value_is_used_in_voxels_as_they_are(tmp_path: Path) -> None:
+def test_given_iso_value_is_in_units_of_the_source_voxels(tmp_path: Path) -> None:
     source, out = _source(tmp_path), tmp_path / "out"
     flags = ["--grid", "1x1", "--iso-value", "F body=400"]
     assert main(["plan", str(source), "-o", str(out), *flags]) == 0
@@ -180,7 +182,7 @@ def test_given_iso_value_is_used_in_voxels_as_they_are(tmp_path: Path) -> None:
     iso = channel["iso"]["r0_c0"]
     assert iso["value"] == 400
     assert iso["background"] == 0
-    # A level that the user gives is not rated, and its alternatives are known.
+    # A level that the user gives has no confidence, but its alternatives are listed.
     assert iso["confidence"] is None
     assert channel["appearance"]["surface"] == "clear"
     assert channel["ladder"]
@@ -190,7 +192,7 @@ def test_given_iso_value_is_used_in_voxels_as_they_are(tmp_path: Path) -> None:
 
 
 def _one_line(capsys: pytest.CaptureFixture[str]) -> str:
-    """Return the error that was printed, the phases' own lines apart."""
+    """Return the printed error, without the lines of the phases."""
     lines = capsys.readouterr().err.splitlines()
     errors = [line for line in lines if line.startswith("stereocell: ")]
     assert len(errors) == 1, lines
@@ -222,7 +224,7 @@ def test_build_of_another_input_into_a_used_out_is_refused(
         (["--time", "3"], 2, "--time: found 3, expected 0 to 0"),
     ],
 )
-def test_wrong_flags_leave_nothing(
+def test_wrong_flags_leave_no_file(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     arguments: list[str],
@@ -244,11 +246,11 @@ def test_all_zero_volume_builds_without_a_surface(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_nan_outside_the_field_of_view_is_built_as_the_darkest(
+def test_nan_outside_the_field_of_view_counts_as_the_darkest_value(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     body = phantoms.f_phantom().astype(np.float32)
-    body[:, :6] = np.nan  # as a stack has it that was registered
+    body[:, :6] = np.nan  # as at the edge of a registered stack
     body[3, 20, 5], body[4, 21, 6] = np.inf, -np.inf
     for name, voxels in (
         ("gaps", body),
@@ -270,7 +272,7 @@ def test_nan_outside_the_field_of_view_is_built_as_the_darkest(
     assert levels[0] is not None
 
 
-def test_nothing_but_nan_is_named_by_the_plan(
+def test_plan_names_a_source_of_only_nan(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     voxels = np.full((4, 24, 24), np.nan, np.float32)
@@ -280,7 +282,7 @@ def test_nothing_but_nan_is_named_by_the_plan(
 
 
 @pytest.mark.parametrize("phase", ["units", "stage", "bundle", "report"])
-def test_phase_without_the_one_before_names_it(
+def test_phase_names_the_missing_phase_before_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], phase: str
 ) -> None:
     assert main([phase, str(tmp_path / "out")]) == 1
@@ -320,7 +322,8 @@ def test_fewer_channels_leave_no_stale_file_in_the_stage(built: Path, tmp_path: 
     shutil.copytree(built, out)
     source = str(_source(tmp_path))
     assert main(["build", source, "-o", str(out), *BUILD, "--channels", "F body"]) == 0
-    assert list(out.rglob("empty*")) != []  # the units stay: they may be wanted again
+    # The units stay, because a later plan may need them again.
+    assert list(out.rglob("empty*")) != []
     for part in ("stage", "bundle"):
         left = [f for f in (out / part).rglob("*empty*") if f.parent.name != "assets"]
         assert not left
@@ -361,7 +364,7 @@ def test_readme_s_edit_layer_recolours_the_bundle(built: Path, tmp_path: Path) -
     assert manifest["channels"][0]["color"] == pytest.approx([1, 0.1, 0.1])
 
 
-def test_one_unit_alone_does_not_pass_for_all(
+def test_one_finished_unit_does_not_count_as_all_units(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source, out = _source(tmp_path), tmp_path / "out"

@@ -36,7 +36,9 @@ CASES: dict[str, tuple[dict[str, Any], tuple[Any, Any]]] = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_channel_has_the_colour_of_its_light_in_plan_and_stage(tmp_path: Path, name: str) -> None:
+def test_channel_has_the_colour_of_its_emission_in_plan_and_stage(
+    tmp_path: Path, name: str
+) -> None:
     stated, expected = CASES[name]
     names = ["a", "b"]
     z, y, x = np.indices((8, 20, 20))

@@ -1,4 +1,4 @@
-"""The command line: what contradicts itself, what is missing, and the exit codes."""
+"""The command line: contradictory flags, missing arguments, and exit codes."""
 
 import json
 import os
@@ -26,7 +26,7 @@ def source(tmp_path: Path) -> Path:
 
 
 def _refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """Run a command that is wrong usage; return its only line."""
+    """Run a command with wrong usage; return its only line."""
     capsys.readouterr()
     assert main(arguments) == 2
     lines = capsys.readouterr().err.splitlines()
@@ -87,7 +87,7 @@ def test_out_inside_the_input_is_refused(
 
 
 @pytest.mark.parametrize("name", ["a\nb", "a\nb/out", "bell\a"])
-def test_an_out_that_usd_can_t_name_is_refused_before_anything_is_made(
+def test_out_that_usd_cannot_name_is_refused_before_any_work(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     home = tmp_path / "home"
@@ -104,7 +104,7 @@ def test_an_iso_value_by_index_is_kept_by_name(source: Path, tmp_path: Path) -> 
     assert OutFolder(out).plan().settings.iso_values == {"F again": 400.0}
 
 
-def test_the_settings_that_a_build_leaves_make_the_same_plan(source: Path, tmp_path: Path) -> None:
+def test_settings_file_of_a_build_makes_the_same_plan(source: Path, tmp_path: Path) -> None:
     first, second, third = (tmp_path / name for name in "abc")
     assert main(["plan", str(source), "-o", str(first), "--grid", "5x3", "--region", ":,:,1:"]) == 0
     used = ["--config", str(first / "stereocell.toml")]
@@ -115,7 +115,7 @@ def test_the_settings_that_a_build_leaves_make_the_same_plan(source: Path, tmp_p
     assert len(OutFolder(third).plan().tiles) == 1
 
 
-def test_printed_settings_are_to_be_edited_and_left_ones_to_be_copied(
+def test_printed_settings_begin_as_a_template_and_those_of_a_build_as_a_record(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["settings"]) == 0
@@ -127,17 +127,18 @@ def test_printed_settings_are_to_be_edited_and_left_ones_to_be_copied(
     assert tomllib.loads(left).keys() == tomllib.loads(printed).keys()
 
 
-def test_workers_are_the_cores_that_we_may_run_on(
+def test_default_number_of_workers_is_the_number_of_usable_cores(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from stereocell.cli import __main__ as cli
 
-    monkeypatch.setattr("stereocell.cli.flags.cores", cores)  # tests build without workers
+    # Undoes the default of tests, which is no workers.
+    monkeypatch.setattr("stereocell.cli.flags.cores", cores)
     with monkeypatch.context() as patch:
         patch.setattr(os, "sched_getaffinity", lambda process: {3}, raising=False)
         assert cli._parser().parse_args(["units", "out"]).workers == 1
     assert 1 <= cli._parser().parse_args(["units", "out"]).workers <= (os.cpu_count() or 1)
-    # a container with half of a core's time
+    # A container that may use half of a core's time.
     monkeypatch.setattr("stereocell.storage.processes.container_cores", lambda: 0.5)
     assert cli._parser().parse_args(["units", "out"]).workers == 1
 
@@ -149,7 +150,7 @@ def test_help_says_what_a_region_counts(capsys: pytest.CaptureFixture[str]) -> N
     assert "build" in COMMANDS
 
 
-def test_a_machine_is_answered_in_json(
+def test_json_flag_prints_json(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = str(tmp_path / "out")
@@ -175,7 +176,7 @@ def test_a_machine_is_answered_in_json(
     assert "`stereocell plan --help`" in line
 
 
-def test_without_a_terminal_progress_is_a_line_a_unit_without_colours(
+def test_without_a_terminal_progress_is_one_plain_line_per_unit(
     source: Path, tmp_path: Path
 ) -> None:
     out = str(tmp_path / "out")
@@ -189,14 +190,14 @@ def test_without_a_terminal_progress_is_a_line_a_unit_without_colours(
     assert told.stdout == ""
 
 
-def test_exit_codes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_lists_the_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["--help"])
     told = capsys.readouterr().out
     assert all(f"\n  {code:<5}" in told for code in ("0", "1", "2", "130", "141", "143"))
 
 
-def test_no_color_leaves_the_colours_out() -> None:
+def test_no_color_turns_colours_off() -> None:
     progress = (
         "from stereocell.engine import run as engine\n"
         "with engine._progress('units', 2) as advance:\n"
@@ -224,7 +225,7 @@ def test_no_color_leaves_the_colours_out() -> None:
         (["view", "BUNDLE", "--port", "0", "--no-browser"], 141, ""),
     ],
 )
-def test_who_goes_away_in_the_middle_of_an_answer_is_no_error(
+def test_closed_pipe_is_not_an_error(
     arguments: list[str], code: int, told: str, tmp_path: Path
 ) -> None:
     plain_bundle.write(tmp_path, plain_bundle.FILES)
@@ -241,7 +242,7 @@ def test_who_goes_away_in_the_middle_of_an_answer_is_no_error(
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
 @pytest.mark.parametrize("flags", [[], ["--json"]])
-def test_an_answer_for_which_there_is_no_space_is_an_error_of_one_line(flags: list[str]) -> None:
+def test_full_disk_under_stdout_is_an_error_of_one_line(flags: list[str]) -> None:
     command = [sys.executable, "-m", "stereocell.cli", "settings", *flags]
     with open("/dev/full", "w") as full:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
@@ -249,6 +250,6 @@ def test_an_answer_for_which_there_is_no_space_is_an_error_of_one_line(flags: li
     assert done.stderr == "stereocell: stdout: No space left on device\n"
 
 
-def test_a_port_that_there_is_not_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+def test_impossible_port_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["view", "out/mine", "--port", "99999"]) == 2
     assert "'99999' is not a port, expected 0 to 65535" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Structures that are darker than their surroundings, as the membranes of electron microscopy."""
+"""Structures that are darker than their surroundings, such as membranes in electron microscopy."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ def _membranes() -> NDArray[np.bool_]:
 
 @pytest.fixture(scope="module")
 def tissue(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Return the path of an electron micrograph: dark membranes, light cytoplasm, noise."""
+    """Write a micrograph of dark membranes, light cytoplasm and noise; return its path."""
     path = tmp_path_factory.mktemp("em") / "tissue.tif"
     noise = np.random.default_rng(2).normal(0, 8, SHAPE)
     voxels = (np.where(_membranes(), MEMBRANE, CYTOPLASM) + noise).round().astype(np.uint8)
@@ -84,9 +84,7 @@ def test_the_volume_of_an_electron_micrograph_shows_membranes(tissue: str, tmp_p
     assert opacities[at[1]] == 0
 
 
-def test_a_surface_round_dark_structures_is_built_where_it_is_asked_for(
-    tissue: str, tmp_path: Path
-) -> None:
+def test_surface_round_dark_structures_is_built_on_request(tissue: str, tmp_path: Path) -> None:
     look = _built(tissue, tmp_path / "out", "--surfaces", "0=outer")
     assert look.iso_value == pytest.approx(255 - (MEMBRANE + CYTOPLASM) / 2, abs=25)
 

@@ -1,6 +1,6 @@
 """Files of deploy/ agree with the package, and name only versions of Python that are tested.
 
-There is no container engine here: test_empty_environment.py carries out the Containerfile's steps.
+Tests have no container engine. test_empty_environment.py carries out the Containerfile's steps.
 """
 
 import re
@@ -18,9 +18,9 @@ from support.container_image import read_steps
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"
-# conda-forge calls these otherwise
+# Packages that have another name on conda-forge
 CONDA = {
-    "dask": "dask-core",  # distributed brings the rest
+    "dask": "dask-core",  # `distributed` brings the rest of dask
     "libigl": "igl",
     "matplotlib": "matplotlib-base",
     "openexr": "openexr-python",
@@ -29,7 +29,7 @@ CONDA = {
     "vtk": "vtk-base",
 }
 LINUX = {"sys_platform": "linux", "platform_machine": "x86_64"}
-# hosts of package registries: each person's own settings say where packages come from
+# Hosts of package registries. No file may name them, because users set their own.
 REGISTRIES = re.compile(
     r"pypi\.org|pythonhosted\.org|npmjs\.(org|com)|yarnpkg\.com|anaconda\.(org|com)|crates\.io"
     r"|proxy\.golang\.org|rubygems\.org|nuget\.org|jsdelivr\.net|unpkg\.com"
@@ -41,11 +41,11 @@ def project() -> dict[str, Any]:
     return found
 
 
-def test_the_recipe_asks_for_what_the_package_does() -> None:
+def test_conda_recipe_has_the_requirements_of_the_package() -> None:
     recipe = yaml.safe_load((DEPLOY / "conda" / "recipe.yaml").read_text("utf-8"))
     python, *asked = recipe["requirements"]["run"]
     assert python.startswith("python >=")
-    # conda builds its own packages for Macs with an Intel processor, and a recipe has no markers
+    # A recipe has no markers. For Macs with an Intel processor, conda builds packages of its own.
     wanted = [
         one
         for one in map(Requirement, project()["dependencies"])
@@ -61,7 +61,7 @@ def test_the_recipe_asks_for_what_the_package_does() -> None:
     assert recipe["build"]["python"]["entry_points"] == [" = ".join(script)]
 
 
-def test_what_the_table_of_sizes_says_of_requirements_is_so() -> None:
+def test_table_of_sizes_states_the_true_users_of_requirements() -> None:
     page = (ROOT / "docs" / "installation-size.md").read_text("utf-8")
     rows = dict(re.findall(r"^\| ([a-z0-9-]+) \| \d+ \| \d+ \| (.*) \|$", page, re.MULTILINE))
     assert rows.keys() <= {Requirement(line).name for line in project()["dependencies"]}
@@ -95,7 +95,7 @@ def test_the_services_of_compose_are_commands_that_exist() -> None:
             assert re.search(rf"{flag}\b", told), f"dask {command}: {flag}"
     # A program that reaches the scheduler can run code in the workers, so no port is published.
     assert all("ports" not in service for service in services.values())
-    # all see the store and the input under the same names
+    # All services see the store and the input under the same names.
     ours = [services[name] for name in ("scheduler", "worker", "stereocell")]
     assert all(one["environment"] == ours[0]["environment"] for one in ours)
     assert all(one["volumes"] == ours[0]["volumes"] for one in ours)
@@ -129,13 +129,13 @@ def test_all_files_name_only_versions_of_python_that_are_tested() -> None:
     workflow = (ROOT / "docs" / "examples" / "check-bundle.yml").read_text("utf-8")
     (of_workflow,) = re.findall(r'python-version: "([\d.]+)"', workflow)
     assert of_workflow in tested
-    # CI's short look at the newest of them
+    # CI runs a short test with the newest version.
     newest = max(tested, key=lambda version: int(version.removeprefix("3.")))
     assert f"\nNEWEST := {newest}\n" in (ROOT / "Makefile").read_text("utf-8")
     assert "test-newest" in (ROOT / ".ci" / "run").read_text("utf-8")
     table = (ROOT / "docs" / "systems.md").read_text("utf-8")
     assert set(re.findall(r"^\| Linux, x86-64, Python ([\d.]+) \|", table, re.MULTILINE)) == tested
-    # the image has no compiler
+    # The image has no compiler, so it installs wheels only.
     assert "--only-binary :all:" in (DEPLOY / "Containerfile").read_text("utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Builds from DICOM and NIfTI: bodies lie at their place in the world, in every file."""
+"""Builds from DICOM and NIfTI: in every file, bodies lie at their place in the world."""
 
 import json
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from support.nifti_files import write as write_nifti
 SHAPE = (24, 40, 36)
 OBLIQUE = turn((1, 2, -0.5), 23.0)
 AIR = -1024
-LEVEL = 720  # above the other bodies' heights: a ball round the brightest is all that is left
+LEVEL = 720  # above the other bodies' heights, so only a ball of the brightest body remains
 RADIUS_UM = 1000 * BODIES[0][1] * np.sqrt(2 * np.log(BODIES[0][2] / LEVEL))
 # world = (L, S, -P)
 CENTRE_UM = 1000 * np.array([BRIGHTEST[0], BRIGHTEST[2], -BRIGHTEST[1]])
@@ -29,7 +29,7 @@ CENTRE_UM = 1000 * np.array([BRIGHTEST[0], BRIGHTEST[2], -BRIGHTEST[1]])
 
 def dicom(folder: Path) -> Path:
     affine = grid("sagittal", SHAPE, (1.5, 1.2, 1.2), OBLIQUE, shift=(6, -10, 4))
-    # as scanners do: 12 bits without a sign, and air at -1024
+    # As scanners store values: 12 bits without a sign, and air at -1024.
     write_series(folder, affine, SHAPE, modality="CT", dtype=np.uint16, bits=12, intercept=AIR)
     return folder
 
@@ -47,7 +47,7 @@ def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     source, out = make(folder / "source"), folder / "out"
     level = f"CT={LEVEL + AIR}" if make is dicom else f"NIfTI={LEVEL}"
     config = folder / "mine.toml"
-    config.write_text('[plan]\nmodality = "PT"\n')  # NIfTI has none of its own
+    config.write_text('[plan]\nmodality = "PT"\n')  # NIfTI states no modality
     given = [str(source), "-o", str(out), "--iso-value", level, "--grid", "2x1"]
     given += ["--config", str(config)]
     assert main(["plan", *given]) == 0
@@ -57,7 +57,7 @@ def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 
 def is_the_ball(points_um: NDArray[np.float64]) -> bool:
-    """Whether points lie on the ball, a voxel's half and the smoothing allowed for."""
+    """Return whether points lie on the ball, within half a voxel and the effect of smoothing."""
     away = np.linalg.norm(points_um - CENTRE_UM, axis=1)
     middle = (points_um.min(axis=0) + points_um.max(axis=0)) / 2
     return bool(np.abs(away - RADIUS_UM).max() < 1000 and np.linalg.norm(middle - CENTRE_UM) < 400)
@@ -76,7 +76,7 @@ def test_the_stage_has_the_ball_at_its_place(built: Path) -> None:
     assert [str(op.GetOpName()) for op in operations] == ["xformOp:transform"]
 
 
-def test_the_extents_of_the_stage_hold_what_is_in_it(built: Path) -> None:
+def test_extents_of_the_stage_contain_its_content(built: Path) -> None:
     stage = Usd.Stage.Open(str(built / "stage" / "stage.usda"))
     purposes = [UsdGeom.Tokens.default_]
     drawn = UsdGeom.BBoxCache(Usd.TimeCode.Default(), purposes, useExtentsHint=False)
@@ -116,16 +116,17 @@ def test_the_bundle_s_volumes_have_the_bright_body_at_its_place(built: Path) -> 
         size = np.array(entry["size"])
         texels = np.frombuffer(zstandard.decompress(frame), np.uint8).reshape(size[::-1])
         inside = texels[1:-1, 1:-1, 1:-1]
-        # texture x, y, z -> share of the box: y runs down, see schemas/volumes.schema.json
+        # Texture x, y, z to shares of the box; y runs down, see schemas/volumes.schema.json.
         z, y, x = np.nonzero(inside > 255 * LEVEL / 1000)
         share = np.stack([x, inside.shape[1] - 1 - y, z], axis=-1) / (size - 3)
         low, high = (np.array(entry["bounds_um"][end]) for end in ("min", "max"))
-        matrix = np.array(entry["matrix"]).reshape(4, 4).T  # it is column-major
+        matrix = np.array(entry["matrix"]).reshape(4, 4).T  # the stored matrix is column-major
         places = (low + share * (high - low)) @ matrix[:3, :3].T + matrix[:3, 3]
         total += len(places)
         moment += places.sum(axis=0)
     assert total > 100
-    assert np.linalg.norm(moment / total - CENTRE_UM) < 600  # the tiles share a plane of voxels
+    # The tiles share a plane of voxels, which counts twice.
+    assert np.linalg.norm(moment / total - CENTRE_UM) < 600
 
 
 def test_the_manifest_knows_the_modality_and_check_finds_nothing(built: Path) -> None:
@@ -140,7 +141,7 @@ def test_the_manifest_knows_the_modality_and_check_finds_nothing(built: Path) ->
 
 
 @pytest.mark.parametrize(("write", "modality"), [(nifti, "MR"), (dicom, "CT")])
-def test_the_preset_s_modality_holds_where_the_input_says_none(
+def test_modality_of_the_preset_holds_if_the_input_states_none(
     write: Callable[[Path], Path], modality: str, tmp_path: Path
 ) -> None:
     source = write(tmp_path / "s")

@@ -1,4 +1,4 @@
-"""Nothing that tells whose images they are leaves the reader: not a byte of it is in any output."""
+"""No byte of a patient's identity leaves the reader: none is found in any output."""
 
 import base64
 import gzip
@@ -30,11 +30,11 @@ from support import dicom_mosaics, identity_search
 from support.dicom_segmentations import write_segmentation
 from support.dicom_series import compress, grid, write_enhanced, write_series
 
-# Every text has TEXT in it, every UID NUMBER, every date and time its own; a count follows.
+# Every text contains TEXT and a count, every UID NUMBER, every date DATE, every time TIME.
 TEXT, NUMBER, DATE, TIME = "ZQ7KX9WV", "73194628150937", "19370214", "113355"
 WORDS = [TEXT, NUMBER, DATE, TIME + ".7719"]
 SHAPE = (10, 30, 26)
-# what the reader must understand
+# Elements that the reader must understand
 _NEEDED = {
     "SOPClassUID", "MediaStorageSOPClassUID", "TransferSyntaxUID", "SpecificCharacterSet",
     "Modality", "PhotometricInterpretation", "PixelSpacing", "ImagePositionPatient",
@@ -52,7 +52,7 @@ def marked(vr: str, count: int) -> str | None:
 
 
 def mark(ds: Dataset, group: Callable[[int], bool]) -> int:
-    """Put a marker into every text, UID, date and time of the standard's dictionary."""
+    """Put a marker into each text, UID, date and time element of the standard's dictionary."""
     count = 0
     for tag, (vr, *_, keyword) in DicomDictionary.items():
         value = marked(vr.split(" ")[0], count)
@@ -120,7 +120,7 @@ def jpeg(folder: Path) -> None:
     for path in paths:
         compress(path, JPEGLosslessSV1)
         packed = pydicom.dcmread(path)
-        mark_all(packed)  # GDCM drops some
+        mark_all(packed)  # GDCM drops some elements
         packed.save_as(path)
 
 
@@ -141,7 +141,7 @@ def mosaic(folder: Path) -> None:
 
 def packed_nifti(folder: Path) -> None:
     values = np.arange(8 * 9 * 10, dtype=np.float32).reshape(8, 9, 10)
-    values[0, 0, 0] = np.nan  # that is said
+    values[0, 0, 0] = np.nan  # makes the reader print a note
     nifti = nibabel.Nifti1Image(values, np.eye(4))
     for field in ("descrip", "db_name", "aux_file", "intent_name"):
         nifti.header[field] = TEXT
@@ -153,7 +153,7 @@ def packed_nifti(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("write", [enhanced, jpeg, mosaic, packed_nifti])
-def test_no_identity_is_in_what_is_made_of_other_kinds_of_file(
+def test_no_identity_is_in_results_of_other_kinds_of_file(
     write: Callable[[Path], None],
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -164,7 +164,7 @@ def test_no_identity_is_in_what_is_made_of_other_kinds_of_file(
     folder.mkdir()
     write(folder)
     source = str(folder)
-    if write is packed_nifti:  # the path that is typed stays in plan.json
+    if write is packed_nifti:  # plan.json keeps the path that the user typed
         source = str(folder / "a.nii.gz")
     assert main(["plan", source, "-o", str(out)]) == 0
     assert main(["slices", source, "-o", str(out / "slices")]) == 0
@@ -178,7 +178,7 @@ def test_no_identity_is_in_what_is_made_of_other_kinds_of_file(
 
 
 @pytest.mark.slow
-def test_no_identity_is_in_any_byte_of_what_a_build_leaves(
+def test_no_identity_is_in_any_byte_of_a_build(
     series: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -190,7 +190,7 @@ def test_no_identity_is_in_any_byte_of_what_a_build_leaves(
     assert main(["slices", str(series), "-o", str(out / "slices")]) == 0
     assert main(["build", str(series), "-o", str(out), "--series", "list"]) == 0
     assert main(["export", str(out), str(out / "scene.html")]) == 0
-    library = BrickLibrary(out / "bundle", out / "bricks")  # as `serve` caches it
+    library = BrickLibrary(out / "bundle", out / "bricks")  # the cache of `serve`
     for tile, channel in library.volumes():
         library.open(tile, channel)
     assert list((out / "bricks").iterdir())
@@ -199,11 +199,11 @@ def test_no_identity_is_in_any_byte_of_what_a_build_leaves(
     assert "MR, coronal" in told.out
     assert identity_search.find(out, WORDS, texts) == []
     assert sum(file.stat().st_size for file in out.rglob("*") if file.is_file()) > 100_000
-    # the same search, where the words are
+    # The same search finds all words in the source.
     assert {hit.split(" ")[0] for hit in identity_search.find(series, WORDS)} == set(WORDS)
 
 
-def test_no_identity_of_a_segmentation_is_in_what_is_made_of_its_objects(
+def test_no_identity_of_a_segmentation_is_in_the_results_of_its_objects(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.DEBUG)
@@ -332,7 +332,7 @@ def compressed_junk(path: Path) -> None:
 
 @pytest.mark.parametrize("spoil", [cut, garble, misplace, misname, compressed_junk])
 @pytest.mark.parametrize("share", ["one", "all"])
-def test_messages_about_spoilt_files_hold_no_identity(
+def test_messages_about_damaged_files_contain_no_identity(
     series: Path,
     tmp_path: Path,
     spoil: Callable[[Path], None],
@@ -359,7 +359,7 @@ def test_messages_about_spoilt_files_hold_no_identity(
     )
 
 
-def test_texts_of_nifti_and_its_name_stay_behind(tmp_path: Path) -> None:
+def test_texts_and_name_of_a_nifti_file_are_not_copied(tmp_path: Path) -> None:
     nifti = nibabel.Nifti1Image(np.arange(8 * 9 * 10, dtype=np.int16).reshape(8, 9, 10), np.eye(4))
     nifti.header["descrip"] = nifti.header["db_name"] = nifti.header["aux_file"] = TEXT
     nifti.header["intent_name"] = TEXT

@@ -1,4 +1,4 @@
-"""What `stereocell doctor` finds on this machine, and on one that has nothing."""
+"""`stereocell doctor` on this machine, and on one that has no optional programs."""
 
 import json
 import re
@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 Usage = namedtuple("Usage", "total used free")
 
 
-def test_every_missing_thing_says_what_it_costs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_missing_thing_has_a_cost(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["ok"]
@@ -32,7 +32,7 @@ def test_every_missing_thing_says_what_it_costs(capsys: pytest.CaptureFixture[st
 
 
 def test_on_a_bare_machine(tmp_path: Path) -> None:
-    """Nothing on the PATH, no display, nothing in the environment."""
+    """The PATH and the environment are empty, and there is no display."""
     answer = subprocess.run(
         [sys.executable, "-m", "stereocell.cli", "doctor", "--json"],
         env={"HOME": str(tmp_path), "PATH": str(tmp_path)},
@@ -48,7 +48,7 @@ def test_on_a_bare_machine(tmp_path: Path) -> None:
     assert answer.stderr == ""
 
 
-def test_where_no_package_is_installed_they_are_named_without_a_traceback(tmp_path: Path) -> None:
+def test_missing_packages_are_named_without_a_traceback(tmp_path: Path) -> None:
     about = Path(str(metadata.distribution("stereocell")._path))  # type: ignore[attr-defined]
     shutil.copytree(about, tmp_path / about.name)
     code = Path(doctor.__file__).parents[2]
@@ -77,7 +77,7 @@ def test_where_no_package_is_installed_they_are_named_without_a_traceback(tmp_pa
     assert not (tmp_path / "out").exists()
 
 
-def test_what_is_needed_fails(
+def test_missing_requirement_fails(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     named = [
@@ -99,7 +99,7 @@ def test_what_is_needed_fails(
     assert "without disk: 3.0 GiB free in this folder: a large build may not fit" in told
 
 
-def test_a_look_that_wants_a_missing_package_says_so(
+def test_check_that_needs_a_missing_package_names_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def lacking() -> int:
@@ -114,7 +114,7 @@ def test_a_look_that_wants_a_missing_package_says_so(
     assert "without disk" in told or "ok      disk" in told
 
 
-def test_a_folder_that_is_gone_does_not_end_the_looks(
+def test_removed_folder_does_not_end_the_checks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "gone").mkdir()
@@ -126,7 +126,7 @@ def test_a_folder_that_is_gone_does_not_end_the_looks(
     assert "GPU" in told
 
 
-def test_a_browser_and_a_node_are_there_and_new_enough_or_not(
+def test_browser_and_node_must_exist_and_be_new_enough(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = tmp_path / "node"
@@ -140,7 +140,7 @@ def test_a_browser_and_a_node_are_there_and_new_enough_or_not(
         assert doctor._browser().ok == is_there
 
 
-def test_what_few_need_is_told_as_optional(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_extras_are_reported_as_optional(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "find_spec", lambda module: None)
     found = {one.name: one for one in doctor.examine()}
     pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))

@@ -1,7 +1,7 @@
-"""The wheel by itself, installed as the container does it: locked wheels, no compiler, no Node.
+"""The wheel alone, installed as in the container: locked wheels, no compiler, no Node.
 
-The steps of deploy/Containerfile make the environment, and its entrypoint runs the commands. The
-smallest sample is built, checked, exported and shown.
+The steps of deploy/Containerfile make the environment, and its entrypoint runs the commands. Tests
+build, check, export and show the smallest sample.
 """
 
 import json
@@ -24,13 +24,13 @@ from support.wheel_making import build_package, take_compiled
 ROOT = Path(__file__).parents[2]
 SAMPLE = ("sample", "cycif", "s.ome.zarr", "--grid", "1x1", "--tile-size", "16,48,48")
 BUILD = ("build", "s.ome.zarr", "-o", "out", "--channels", "CD31", "--workers", "0")
-LEFT_OUT = "kernels-closing-"  # compiled in the environment, without a compiler
+LEFT_OUT = "kernels-closing-"  # these kernels are compiled in the environment
 
 pytestmark = pytest.mark.slow
 
 
 def give_kernels(image: Image) -> None:
-    """Give the environment all compiled kernels except one, which it compiles by itself."""
+    """Give the environment all compiled kernels except one, which the environment compiles."""
     cache = Path(image.variables["NUMBA_CACHE_DIR"])
     take_compiled(image.package / "kernels", cache)
     (left_out,) = cache.glob(f"{LEFT_OUT}*")
@@ -50,7 +50,7 @@ def make_context(folder: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Image:
-    """The image of deploy/Containerfile."""
+    """Carry out deploy/Containerfile; yield the image."""
     if viewer_dist() is None:
         pytest.skip("the viewer is not built: `make setup`")
     folder = tmp_path_factory.mktemp("image")
@@ -121,10 +121,10 @@ def test_the_wheel_is_complete_and_its_packages_are_those_of_the_lock(image: Ima
     assert not {"pytest", "mypy", "pymeshlab"} & installed.keys()
 
 
-def test_the_image_runs_as_a_plain_user_and_lets_all_users_share_its_kernels(image: Image) -> None:
+def test_image_runs_as_a_plain_user_and_shares_its_kernels_with_all_users(image: Image) -> None:
     assert not (image.root / "wheel").exists()
     assert image.workdir is not None
-    assert image.workdir.stat().st_mode & 0o7777 == 0o1777  # a mounted folder's stand-in
+    assert image.workdir.stat().st_mode & 0o7777 == 0o1777  # stands in for a mounted folder
     cache = Path(image.variables["NUMBA_CACHE_DIR"])
     compiled = [file for file in cache.rglob("*") if file.is_file()]
     assert any(str(file.relative_to(cache)).startswith(LEFT_OUT) for file in compiled)
@@ -155,7 +155,7 @@ def test_a_sample_is_built_with_the_viewer_and_checked(image: Image, out: Path) 
 @pytest.mark.parametrize(
     ("script", "kind"), [("check_glb.mjs", "*.glb"), ("check_ktx2.mjs", "*.ktx2")]
 )
-def test_the_wheels_validators_need_nothing_but_node(
+def test_validators_of_the_wheel_need_only_node(
     image: Image, out: Path, script: str, kind: str
 ) -> None:
     files = json.dumps([str(file) for file in (out / "bundle").rglob(kind)])
@@ -179,6 +179,6 @@ def test_view_serves_the_page_of_the_bundle(image: Image, out: Path) -> None:
         shown = fetch(f"{address}/")
         assert shown == (out / "bundle" / "index.html").read_bytes()
         parts = re.findall(r'"(?:packed|plain|style)":"([^"]+)"', shown.decode())
-        assert len(parts) == 3  # the code packed and plain, and its style
+        assert len(parts) == 3  # packed code, plain code and style
         for part in parts:
             assert fetch(f"{address}/{part}") == (out / "bundle" / part).read_bytes()

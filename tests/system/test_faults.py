@@ -1,4 +1,4 @@
-"""What a build depends on goes away in the middle and comes back: one line, then the same bytes."""
+"""A build's source, OUT or store fails and comes back: one line, and then the same bytes."""
 
 import os
 import signal
@@ -50,12 +50,12 @@ def undisturbed(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[
 
 
 def assets(digests: dict[str, str]) -> dict[str, str]:
-    """Stage and bundle: what does not name the source."""
+    """Return the digests of stage and bundle, which do not depend on the source's name."""
     return {name: digest for name, digest in digests.items() if not name.startswith("units/")}
 
 
 @pytest.mark.slow
-def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
+def test_missing_source_is_named_and_the_build_goes_on_after_its_return(
     volume: Path,
     undisturbed: dict[str, str],
     tmp_path: Path,
@@ -80,7 +80,7 @@ def test_a_source_that_vanishes_is_named_and_the_build_goes_on_when_it_is_back(
 
 
 @pytest.mark.exhaustive
-def test_a_source_that_vanishes_under_workers_is_named_and_their_units_are_made_when_it_is_back(
+def test_source_that_vanishes_under_workers_is_named_and_units_are_made_after_its_return(
     volume: Path, tmp_path: Path
 ) -> None:
     grid, away, out = "3x2", volume.with_name("away"), tmp_path / "out"
@@ -98,7 +98,7 @@ def test_a_source_that_vanishes_under_workers_is_named_and_their_units_are_made_
     lines = [line for line in printed.splitlines() if line.startswith("stereocell: ")]
     assert lines
     assert all("f.ome.zarr: " in line or " failed" in line for line in lines), lines
-    # a source that is gone can't be compared, so units that were made of it are not kept either
+    # A missing source can't be compared, so units that were made from it are not kept either.
     assert "no result of this pass is kept" in printed
     assert not list(out.glob("units/r*/*/*/unit.json"))
     assert make_assets(volume, out, grid, "--workers", "0") == 0
@@ -152,12 +152,12 @@ def befall(text, **how):
 engine.console.print = befall
 sys.exit(main([phase, out, "--workers", "0"]))
 """
-# root may write anywhere, but for this
+# Takes from root the capability to write anywhere.
 BOUND = ("setpriv", "--bounding-set=-dac_override") if os.geteuid() == 0 else ()
 
 
 def in_the_middle_of(phase: str, out: Path, fault: str) -> list[str]:
-    """Return the command of a phase with a fault, by the same viewer as in this process."""
+    """Return the command of a phase with a fault, which copies the same viewer as this process."""
     viewer = str(phases.viewer_dist())
     return [sys.executable, "-c", IN_THE_MIDDLE, phase, str(out), fault, viewer]
 
@@ -176,7 +176,8 @@ def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goe
         (line,) = [line for line in ended.stderr.splitlines() if line.startswith("stereocell: ")]
         assert str(out) in line
         assert "Permission denied" in line
-        assert "/.lock" not in line  # that it can't be removed either is not the news
+        # The lock can\'t be removed either, but the line should name the first failure.
+        assert "/.lock" not in line
         assert "Traceback" not in ended.stderr
         finished = {file: file.stat().st_mtime_ns for file in out.glob("units/r*/*/*/*")}
         assert finished
@@ -189,7 +190,7 @@ def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goe
 
 
 @pytest.mark.slow
-def test_tiles_that_stage_and_bundle_had_finished_are_not_made_again(
+def test_finished_tiles_of_stage_and_bundle_are_not_made_again(
     volume: Path, undisturbed: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
@@ -200,7 +201,7 @@ def test_tiles_that_stage_and_bundle_had_finished_are_not_made_again(
         assert ended.returncode == -signal.SIGKILL
         (tile,) = out.glob(f"{made}/r0_c[01]")
         finished = {file.relative_to(tile): file.stat().st_mtime_ns for file in tile.rglob("*.*")}
-        assert len(finished) >= 3  # of the stage: layer and two volumes
+        assert len(finished) >= 3  # a tile of the stage has a layer and two volumes
         capsys.readouterr()
         assert main([phase, str(out), "--workers", "0"]) == 0
         (told,) = [one for one in capsys.readouterr().err.splitlines() if f"{phase}: 1/" in one]
@@ -208,7 +209,7 @@ def test_tiles_that_stage_and_bundle_had_finished_are_not_made_again(
         assert tile.name not in told
         final = tile if phase == "stage" else out / "bundle"
         for name, written in finished.items():
-            if name.name != "tile.json":  # stays behind with the parts
+            if name.name != "tile.json":  # not part of the finished bundle
                 assert (final / name).stat().st_mtime_ns == written
     assert not (out / "bundle_parts").exists()
     assert assets(asset_digests(out)) == undisturbed
@@ -258,7 +259,7 @@ def kept(store: ObjectStore, out: str, folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.exhaustive
-def test_a_store_that_fails_now_and_then_is_asked_again(
+def test_store_that_fails_now_and_then_gets_further_requests(
     store: Fixture, undisturbed: dict[str, str], tmp_path: Path
 ) -> None:
     files, faults = store
@@ -299,17 +300,17 @@ def test_a_store_that_is_down_is_named_and_the_build_goes_on_when_it_is_up(
 
 @pytest.fixture
 def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """The address of a host that takes connections and says nothing."""
+    """The address of a host that accepts connections and never answers."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         host = f"127.0.0.1:{server.getsockname()[1]}"
-        # another file system than that of the tests before, which has an endpoint already
+        # These settings make a new file system; that of earlier tests keeps its endpoint.
         told = {"anon": True, "config_kwargs": {"user_agent_extra": host}}
         monkeypatch.setitem(fsspec.config.conf, "s3", told)
         yield host
 
 
 @pytest.mark.parametrize("source", ["s3://b/f.ome.zarr", "http://HOST/f.ome.zarr", ""])
-def test_a_silent_store_is_told_in_a_line(
+def test_silent_store_is_reported_in_one_line(
     source: str,
     silent: str,
     volume: Path,
@@ -327,7 +328,7 @@ def test_a_silent_store_is_told_in_a_line(
 
 
 class Moody(SimpleHTTPRequestHandler):
-    """Serves files; of the finest level in drips, or not at all once `is_hushed`."""
+    """Serves files; those of the finest level slowly, and not at all after `is_hushed` is set."""
 
     is_hushed = Event()
     is_over = Event()
@@ -342,7 +343,7 @@ class Moody(SimpleHTTPRequestHandler):
         for part in range(8):
             outputfile.write(content[len(content) * part // 8 : len(content) * (part + 1) // 8])
             outputfile.flush()
-            time.sleep(0.5)  # of a silence of 3 s: these cores are shared
+            time.sleep(0.5)  # far less than the 3 s that count as silence, because cores are shared
 
     def log_message(self, *_: object) -> None:
         pass
@@ -360,7 +361,7 @@ def test_a_web_host_may_be_slow_but_not_silent(
     source = f"http://127.0.0.1:{server.server_address[1]}/{volume.name}"
     try:
         begin = time.monotonic()
-        dataset = read.open(source)  # the array's metadata drip, too
+        dataset = read.open(source)  # the array's metadata come slowly, too
         dataset.read(0, dataset.levels[0].box)
         assert time.monotonic() - begin > 6.0
         Moody.is_hushed.set()
@@ -373,7 +374,7 @@ def test_a_web_host_may_be_slow_but_not_silent(
         thread.join()
 
 
-def test_what_the_user_has_of_web_clients_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_users_settings_of_web_clients_take_precedence(monkeypatch: pytest.MonkeyPatch) -> None:
     told = {"timeout": ClientTimeout(total=7), "trust_env": True}
     monkeypatch.setitem(fsspec.config.conf, "http", {"client_kwargs": told})
     options = Location.of("https://a/b.ome.zarr").storage_options["client_kwargs"]

@@ -1,4 +1,4 @@
-"""Each command takes the output of each other command, or one line names what it expects."""
+"""Each command takes the outputs of other commands, or states in one line what it expects."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 VOLUMES = {"the sample mri", "the sample brain-cells", "exported .nrrd", "exported .nii.gz"}
 BUNDLES = {"a build", "OUT/bundle", "a published page"}
-# command -> how an output is given to it, and the outputs that it takes
+# For each command, the words with which it gets an output, and the outputs that it accepts
 GIVEN: dict[str, tuple[Callable[[Path, Path], list[object]], set[str]]] = {
     "build": (lambda given, new: ["build", given, "-o", new], VOLUMES),
     "plan": (lambda given, new: ["plan", given, "-o", new], VOLUMES),
@@ -34,7 +34,7 @@ GIVEN: dict[str, tuple[Callable[[Path, Path], list[object]], set[str]]] = {
     "view": (lambda given, _: ["view", given, "--no-browser", "--port", "0"], BUNDLES | VOLUMES),
     "serve": (lambda given, _: ["serve", given, "--port", "0"], BUNDLES | VOLUMES),
 }
-NOT_GIVEN = {"sample", "doctor", "settings"}  # they read nothing
+NOT_GIVEN = {"sample", "doctor", "settings"}  # commands without an input
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def test_every_command_is_tried() -> None:
 
 
 @pytest.mark.parametrize("command", GIVEN)
-def test_a_command_takes_each_output_or_answers_in_one_line(
+def test_command_accepts_each_output_or_refuses_it_in_one_line(
     outputs: Outputs,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -55,7 +55,7 @@ def test_a_command_takes_each_output_or_answers_in_one_line(
     command: str,
 ) -> None:
     monkeypatch.setattr(BundleServer, "run", lambda server: server._socket.close())
-    if command == "build":  # the plan has read the input; the rest takes long
+    if command == "build":  # planning reads the input, and the other phases take long
         monkeypatch.setattr(commands, "_run_phases", lambda *_: commands.Answer(dict.fromkeys(
             ("stage", "bundle", "report"), "")))  # fmt: skip
     if command == "tissue":

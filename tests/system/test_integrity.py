@@ -1,6 +1,6 @@
-"""One bit that flipped in a file of a build, or a file that is gone: seen, named, and mended.
+"""A flipped bit in a file of a build, or a missing file, is noticed, named and repaired.
 
-Each flip keeps the file's size; a `silent` one keeps its time, too, as a worn disk does.
+Each flip keeps the file's size. A `silent` flip also keeps its time, as on a failing disk.
 """
 
 import json
@@ -27,7 +27,7 @@ from support.exhaustive import sweep
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
 
-# names with a space and an apostrophe; the second has no surface
+# Names with a space and an apostrophe; the second channel has no surface.
 NAMES = ["Alice's F", "empty"]
 F = "Alice_x27_s_x20_F"
 UNIT_FILES = ["unit.json", "volume.npy", "lod0.npz", "closed.stl"]
@@ -107,7 +107,7 @@ def test_flipped_bit_of_a_unit_is_named_by_check(out: Path, name: str, silent: b
 
 
 @pytest.mark.parametrize("name", sweep(UNIT_FILES, kept=["volume.npy"]))
-def test_unit_with_a_flipped_bit_is_made_anew(out: Path, built: Path, name: str) -> None:
+def test_unit_with_a_flipped_bit_is_made_again(out: Path, built: Path, name: str) -> None:
     _flip(_unit(out) / name)
     _go_on(out)
     assert _assets(out) == _assets(built)
@@ -120,7 +120,7 @@ def test_no_flipped_bit_of_a_unit_gets_into_the_stage(
     shutil.rmtree(out / "stage")
     _flip(_unit(out) / name, silent=True)
     capfd.readouterr()
-    if name == "unit.json":  # is read by each command, and so found damaged whenever it was
+    if name == "unit.json":  # each command reads it, and so notices the damage
         assert not is_whole(_unit(out))
     assert main(["stage", str(out), *FLAGS]) == 1
     said = capfd.readouterr().err
@@ -132,7 +132,7 @@ def test_no_flipped_bit_of_a_unit_gets_into_the_stage(
     assert _assets(out) == _assets(built)
 
 
-def test_lost_file_of_a_unit_is_named(out: Path) -> None:
+def test_missing_file_of_a_unit_is_named(out: Path) -> None:
     (_unit(out) / "lod1.npz").unlink()
     assert find_damage(_unit(out)) == {"lod1.npz": "missing"}
     assert "lod1.npz: missing" in _line(out, "units").detail
@@ -149,7 +149,7 @@ def test_each_damaged_file_is_named(out: Path) -> None:
 
 
 def _change_a_digit(file: Path) -> None:
-    """Turn one digit of a JSON file's first broken number into another; size and time stay."""
+    """Change one digit of the first fraction in a JSON file; size and time stay the same."""
     status, text = file.stat(), file.read_text("utf-8")
     place = next(re.finditer(r"[1-9]\d*\.\d", text)).start()
     digit = "2" if text[place] == "1" else "1"
@@ -164,7 +164,7 @@ def _change_a_digit(file: Path) -> None:
         kept=[f"window-{F}-*.json", "survey.json"],
     ),
 )
-def test_what_the_units_rest_on_is_named_and_found_anew(
+def test_damaged_inputs_of_units_are_named_and_computed_again(
     out: Path, built: Path, capfd: pytest.CaptureFixture[str], name: str
 ) -> None:
     (file,) = (out / "units").glob(name)
@@ -186,7 +186,7 @@ def test_what_the_units_rest_on_is_named_and_found_anew(
 # --- the stage
 
 
-def test_the_list_holds_all_that_the_stage_phase_wrote(built: Path) -> None:
+def test_list_has_all_files_of_the_stage_phase(built: Path) -> None:
     listed = json.loads((built / "stage" / "files.json").read_bytes())
     written = digests_of(built / "stage")
     del written["files.json"]
@@ -209,7 +209,7 @@ def test_flipped_bit_of_the_stage_is_named_by_check(out: Path, name: str, silent
 
 
 @pytest.mark.parametrize("name", sweep(STAGE_FILES, kept=[STAGE_FILES[1], "specimen.usdz"]))
-def test_file_of_the_stage_with_a_flipped_bit_is_made_anew(
+def test_file_of_the_stage_with_a_flipped_bit_is_made_again(
     out: Path, built: Path, name: str
 ) -> None:
     _flip(out / "stage" / name)
@@ -242,18 +242,18 @@ def test_no_flipped_bit_of_the_stage_gets_into_the_bundle(
         kept=[f"channels/{F}/r0_c0/lod0.glb"],
     ),
 )
-def test_file_of_the_bundle_with_a_flipped_bit_is_made_anew(
+def test_file_of_the_bundle_with_a_flipped_bit_is_made_again(
     out: Path, built: Path, name: str
 ) -> None:
-    _go_on(out)  # of a copy, the bundle is of another stage
+    _go_on(out)  # makes the bundle from the copied stage
     _flip(out / "bundle" / name)
     assert f"{name}: not the bytes" in _line(out, "hashes").detail
     _go_on(out)
     assert _assets(out) == _assets(built)
 
 
-def test_damaged_manifest_is_named_and_made_anew(out: Path, built: Path) -> None:
-    _go_on(out)  # it is another OUT than it was
+def test_damaged_manifest_is_named_and_made_again(out: Path, built: Path) -> None:
+    _go_on(out)  # the copied OUT gets a bundle of its own stage
     assert _line(out, "hashes").ok
     _change_a_digit(out / "bundle" / "manifest.json")
     line = _line(out, "hashes")
@@ -302,7 +302,7 @@ def test_layer_edited_in_place_stays_and_is_called_edited_or_damaged(
 def test_binary_layer_with_a_flipped_bit_gets_into_no_bundle_and_is_not_overwritten(
     out: Path, built: Path, capfd: pytest.CaptureFixture[str], silent: bool
 ) -> None:
-    """USD opens it: somebody may have edited it, and left it as long as it was."""
+    """USD can open the file, so somebody may have edited it without changing its size."""
     file = out / "stage" / "tiles" / "r0_c0" / "tile.usdc"
     shutil.rmtree(out / "bundle")
     _flip(file, silent=silent)
@@ -327,7 +327,7 @@ def test_layer_that_no_longer_opens_is_damaged(
     file = out / "stage" / "tiles" / "r0_c0" / "tile.usdc"
     status = file.stat()
     data = bytearray(file.read_bytes())
-    data[:8] = bytes(8)  # PXR-USDC
+    data[:8] = bytes(8)  # overwrites the magic number PXR-USDC
     file.write_bytes(data)
     os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert "tile.usdc: damaged" in _line(out, "stage hashes").detail
@@ -339,7 +339,7 @@ def test_layer_that_no_longer_opens_is_damaged(
     assert _assets(out) == _assets(built)
 
 
-def test_files_that_an_artist_puts_there_are_no_damage_and_stay(out: Path, built: Path) -> None:
+def test_files_that_an_artist_adds_are_not_damage_and_stay(out: Path, built: Path) -> None:
     own = [out / "stage" / name for name in ("mine.usda", "tiles/r0_c0/my own.png")]
     for file in own:
         file.write_text("#usda 1.0\n")
@@ -355,7 +355,7 @@ def _empty(file: Path) -> None:
 
 
 @pytest.mark.parametrize("spoil", sweep([Path.unlink, _flip, _empty], kept=[Path.unlink, _flip]))
-def test_list_that_is_lost_or_damaged_is_made_anew(
+def test_missing_or_damaged_list_is_made_again(
     out: Path, built: Path, spoil: Callable[[Path], None]
 ) -> None:
     spoil(out / "stage" / "files.json")
@@ -366,7 +366,7 @@ def test_list_that_is_lost_or_damaged_is_made_anew(
     assert _assets(out) == _assets(built)
 
 
-def test_layer_over_the_stage_elsewhere_reads_no_damaged_file(
+def test_bundle_of_a_layer_elsewhere_reads_no_damaged_file(
     out: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     edit = tmp_path / "edit.usda"
@@ -378,7 +378,7 @@ def test_layer_over_the_stage_elsewhere_reads_no_damaged_file(
     assert f"{STAGE_FILES[0]}: damaged" in capfd.readouterr().err
 
 
-# --- what it costs
+# --- the cost of checks
 
 
 def _count_hashed(hashed: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -394,7 +394,7 @@ def _count_hashed(hashed: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_build_with_nothing_to_do_reads_no_file_of_units_and_stage(
     out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _go_on(out)  # of a copy, the bundle is of another stage
+    _go_on(out)  # makes the bundle from the copied stage
     hashed: list[Path] = []
     _count_hashed(hashed, monkeypatch)
     _go_on(out)

@@ -1,4 +1,4 @@
-"""`make` takes what a person sets as it stands: a name with a quote is a name, and nothing runs."""
+"""`make` passes variables on unchanged: a name with a quote stays a name and never runs."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ NAMES = (
     "a#b", "50%", "a:b", "a\nb", "a\n\ttouch pwned", "-n", "--help", "a\\b", "a\\", "*", "~",
     "a,b", "(", ")", "a=b", "a\tb ", "Gr\u00f6\u00dfe",
 )  # fmt: skip
-# of each kind: a quote, what make and a shell expand or end at, a rule's marks, lines, a flag
+# One of each kind: quote, expansion, end of a command, mark of a rule, line break, flag
 KEPT = ("it's", "$(shell touch pwned)", "a; touch pwned", "50%", "a:b", "a\n\ttouch pwned", "-n")
 FAKE = r"""#!/bin/sh
 { for word; do printf '%s\0' "$word"; done; printf '\1'; } >> calls
@@ -45,7 +45,7 @@ pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="no make")
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
-    """A checkout, itself in a folder with a hard name, whose command is FAKE."""
+    """A checkout in a folder with a hard name; its command is the script FAKE."""
     folder = tmp_path / 'it\'s a "$(touch pwned)" check out'
     folder.mkdir()
     for name in ("Makefile", "pipeline", "schemas", ".venv"):
@@ -57,7 +57,7 @@ def checkout(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def make(checkout: Path) -> Make:
-    """Runs make in the checkout, which counts as set up; variables by name."""
+    """Run make with variables, by name, in the checkout, which counts as set up."""
     ours = ("MAKE", "MFLAGS", "INPUT", "OUT", "SAMPLE", "WORKERS", "ARGS", "CI", "RUN")
 
     def run(
@@ -79,7 +79,7 @@ def make(checkout: Path) -> Make:
 
 
 def calls(checkout: Path) -> list[list[str]]:
-    """Return the words of each call of FAKE since the last time."""
+    """Return the words of each call of FAKE since the last look."""
     file = checkout / "calls"
     text = file.read_text("utf-8") if file.exists() else ""
     file.unlink(missing_ok=True)
@@ -92,7 +92,7 @@ def phases(source: str, out: str) -> list[list[str]]:
 
 
 @pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
-def test_phases_take_names_as_they_stand_and_make_what_is_left(
+def test_phases_pass_names_on_unchanged_and_only_unfinished_phases_run(
     checkout: Path, make: Make, name: str
 ) -> None:
     source, out = name, f"{name}.out"
@@ -114,7 +114,7 @@ def test_phases_take_names_as_they_stand_and_make_what_is_left(
     ]
     make("stage", **set_)
     assert calls(checkout) == phases(source, out)[2:3]
-    # of the environment; with other ARGS the plan is made anew
+    # Variables may come from the environment. With other ARGS the plan is made again.
     del set_["WORKERS"]
     make("plan", environment={**set_, "ARGS": "--grid 2x1"})
     assert calls(checkout) == [["plan", f"--out={out}", "--grid", "2x1", "--", source]]
@@ -126,9 +126,7 @@ def test_phases_take_names_as_they_stand_and_make_what_is_left(
 
 
 @pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
-def test_what_goes_to_a_make_within_make_stays_as_it_is(
-    checkout: Path, make: Make, name: str
-) -> None:
+def test_variables_reach_a_nested_make_unchanged(checkout: Path, make: Make, name: str) -> None:
     ready = "-o .venv/.ready -o viewer_gltf/dist/index.html"
     (checkout / "outer.mk").write_text(f"include Makefile\nagain:\n\t$(MAKE) {ready} serve\n")
     assert make("-f", "outer.mk", "again", OUT=name, ARGS="--lan").returncode == 0
@@ -137,7 +135,7 @@ def test_what_goes_to_a_make_within_make_stays_as_it_is(
 
 
 @pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
-def test_the_demo_and_its_workers_too(checkout: Path, make: Make, name: str) -> None:
+def test_demo_passes_names_on_unchanged(checkout: Path, make: Make, name: str) -> None:
     made = make("demo", OUT=name, WORKERS=name, ARGS="--grid 1x1", SAMPLE="mri")
     assert (made.returncode, made.stderr) == (0, "")
     sampled, built, checked = calls(checkout)
@@ -159,7 +157,7 @@ def test_the_demo_and_its_workers_too(checkout: Path, make: Make, name: str) -> 
 
 
 @pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
-def test_what_is_to_be_tested_is_a_folder_of_tests(checkout: Path, make: Make, name: str) -> None:
+def test_t_must_be_a_folder_of_tests(checkout: Path, make: Make, name: str) -> None:
     (checkout / "tests" / name).mkdir(parents=True)
     made = make("test-here", T=name, PYTEST="./fake")
     assert (made.returncode, made.stderr) == (0, "")
@@ -184,7 +182,7 @@ def test_what_is_to_be_tested_is_a_folder_of_tests(checkout: Path, make: Make, n
         ("ARGS ''", ["ARGS", ""]),
     ],
 )
-def test_args_are_words_as_a_shell_has_them_and_nothing_runs(
+def test_args_are_split_like_shell_words_and_not_run(
     checkout: Path, make: Make, text: str, words: list[str]
 ) -> None:
     assert make("plan", INPUT="ARGS", OUT="o", ARGS=text).returncode == 0
@@ -192,7 +190,7 @@ def test_args_are_words_as_a_shell_has_them_and_nothing_runs(
     assert not (checkout / "pwned").exists()
 
 
-def test_another_request_for_the_same_out_is_planned_anew(checkout: Path, make: Make) -> None:
+def test_another_request_for_the_same_out_is_planned_again(checkout: Path, make: Make) -> None:
     for name in ("a", "a b"):
         (checkout / name).touch()
     for source, text in (("a", "b c"), ("a b", "c"), ("a b", "")):
@@ -203,7 +201,7 @@ def test_another_request_for_the_same_out_is_planned_anew(checkout: Path, make: 
     assert "plan" in make("-n", "plan", INPUT="a b", OUT="o").stdout
 
 
-def test_what_can_not_be_is_told_in_a_line(checkout: Path, make: Make) -> None:
+def test_impossible_variables_are_named_in_one_line(checkout: Path, make: Make) -> None:
     for set_, told in (
         ({"INPUT": "a", "ARGS": 'say "x'}, 'ARGS is say "x (No closing quotation), expected words'),
         ({}, "INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder"),
@@ -219,7 +217,7 @@ def test_what_can_not_be_is_told_in_a_line(checkout: Path, make: Make) -> None:
     assert not (checkout / "pwned").exists()
 
 
-def test_programs_and_folders_have_names_too(checkout: Path, make: Make) -> None:
+def test_programs_and_folders_may_have_hard_names(checkout: Path, make: Make) -> None:
     name = 'it\'s $(touch pwned) "py"; x'
     (checkout / name).write_text("#!/bin/sh\necho Python 3.9\nexit 1\n")
     (checkout / name).chmod(0o755)
@@ -249,7 +247,7 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
         assert (told.returncode, told.stderr) == (0, "")
         return told.stdout.strip()
 
-    assert environment("3.13") == ".venv"  # there is none yet
+    assert environment("3.13") == ".venv"  # no environment exists yet
     (checkout / ".venv" / "lib" / "python3.13").mkdir(parents=True)
     assert [environment(version) for version in ("3.13", "3.12", "3.9")] == [
         ".venv",
@@ -257,7 +255,7 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
         ".venv-3.9",
     ]
     told = make("--eval=told:; @echo $(VENV)", "told", PYTHON="python3")
-    assert told.stdout.strip() == ".venv"  # the default takes it as it is
+    assert told.stdout.strip() == ".venv"  # the default takes any existing environment
     for file in ("requirements.lock", "pyproject.toml"):
         (checkout / file).touch()
     refused = make("setup", PYTHON="./missing")
@@ -288,10 +286,10 @@ def test_the_newest_python_is_found_in_pyenv_or_reported_as_missing(
 
 
 @pytest.mark.slow
-def test_a_build_by_a_hard_name(
+def test_build_with_hard_names(
     checkout: Path, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The words that make gives, taken by the program in this process: five others take seconds."""
+    """The program gets make's words in this process, because five new processes take seconds."""
     source, out = "it's $(touch pwned); 100%.ome.zarr", '-my "out": `touch pwned` #1'
     sample = ["sample", "cycif", str(checkout / source), "--grid", "1x1"]
     assert main([*sample, "--tile-size", "16,48,48"]) == 0

@@ -1,6 +1,7 @@
-"""The malformed inputs in malformed/, one of each kind, or more; `make torture` runs them all.
+"""Malformed inputs of malformed/, at least one of each kind; `make torture` runs them all.
 
-In a process of their own: each case is a fork, and what forks has to have no threads.
+They run in a process of their own: each case is a fork, and a process that forks must have no
+threads.
 """
 
 import json
@@ -22,7 +23,7 @@ OF_EACH_KIND = ("--each-kind", len(one_of_each_kind(all_cases())))
     ("words", "count"),
     sweep([OF_EACH_KIND, (f"--sample={SAMPLE}", SAMPLE)], kept=[OF_EACH_KIND]),
 )
-def test_each_ends_in_a_sound_result_or_one_clear_line(
+def test_malformed_input_gives_a_sound_result_or_one_clear_line(
     tmp_path: Path, words: str, count: int
 ) -> None:
     answer = tmp_path / "faults.json"

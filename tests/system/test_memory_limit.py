@@ -1,4 +1,4 @@
-"""Under a limit of address space (`ulimit -v`) a command ends in one line that names memory."""
+"""Under a limit of the address space (`ulimit -v`), commands end with one line about memory."""
 
 import errno
 import os
@@ -23,7 +23,7 @@ ERRORS = (
     RuntimeError("Resource temporarily unavailable"),
     RuntimeError("std::bad_alloc"),
     OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)),
-    BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)),  # of fork
+    BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)),  # raised by fork
     ImportError("libx.so: failed to map segment from shared object"),
     ImportError("libx.so: cannot allocate memory in static TLS block"),
 )
@@ -46,7 +46,7 @@ def run(source: Path, limit: int, *words: str) -> subprocess.CompletedProcess[st
 
 @pytest.mark.parametrize("limit", [300_000_000, 800_000_000, 1_200_000_000])
 @pytest.mark.parametrize("command", ["plan", "build"])
-def test_a_limit_that_no_library_survives_is_refused_first(
+def test_limit_too_small_for_the_libraries_is_refused_at_the_start(
     tmp_path: Path, limit: int, command: str
 ) -> None:
     source = write_ome_zarr(tmp_path / "v.zarr", [f_phantom()])
@@ -68,7 +68,7 @@ def test_without_a_limit_nothing_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize("error", ERRORS, ids=repr)
-def test_every_want_of_memory_names_it(
+def test_each_kind_of_memory_error_is_reported_as_such(
     error: Exception, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(processes, "address_limit", lambda: 4.0e9)
@@ -89,7 +89,7 @@ def test_every_want_of_memory_names_it(
 
 
 @pytest.mark.parametrize("error", ERRORS[1:6], ids=repr)
-def test_a_reader_s_want_of_memory_is_not_the_file_s_fault(error: Exception) -> None:
+def test_memory_error_of_a_reader_is_not_blamed_on_the_file(error: Exception) -> None:
     with (
         pytest.raises(SourceError, match=r"x.zarr: out of memory"),
         one_line("x.zarr", "chunks that are whole"),

@@ -1,4 +1,4 @@
-"""`plan` prints the notes on how a source is read; its files and the report keep them."""
+"""`plan` prints notes on how it reads a source, and its files and the report keep them."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Commands that write never replace foreign files: these stay, and one line names them."""
+"""Commands that write never replace foreign files. Such a file stays, and one line names it."""
 
 import shutil
 from collections.abc import Callable
@@ -21,7 +21,7 @@ WORK = b"years of work"
 
 
 def _writing(name: str) -> dict[str, tuple[str, Given]]:
-    """Return trials of a command that writes: the ending of the place's name, and the words."""
+    """Return trials of a command that writes: ending of the result's name, and words."""
     if name in ("build", "plan"):
         return {name: ("", lambda source, _, place: [name, source, "-o", place])}
     if name == "slices":
@@ -45,7 +45,7 @@ def _writing(name: str) -> dict[str, tuple[str, Given]]:
         }
     if name == "publish":
         return {name: ("", lambda _, build, place: [name, build, place])}
-    return {name: ("", lambda _s, _b, place: [name, place])}  # of a build that lies there
+    return {name: ("", lambda _s, _b, place: [name, place])}  # the build lies at the place itself
 
 
 TRIALS = {
@@ -60,7 +60,7 @@ NOT_FORCED |= {("iso", "a folder"), ("iso", "another build")}
 OF_A_BUILD = {name for name, places in PLACES.items() if places.writes == "out" and places.reads}
 
 
-# the functions with which the work of the commands begins; a guard comes before each of them
+# The functions with which the commands' work begins. A guard must come before each of them.
 BEGINNINGS = (
     "building.phases.remove_mixed",
     "steps.write_stage_tile.WriteStageTile.run",
@@ -79,7 +79,7 @@ BEGINNINGS = (
 )
 
 
-# and those that open the source: only its fingerprint tells whether a build is another's
+# These commands open the source first, because only its fingerprint identifies a foreign build.
 OPENINGS = (
     "building.phases.settle",
     "planning.preset_choice.open_source",
@@ -89,7 +89,7 @@ OPENINGS = (
 
 @pytest.fixture
 def few_cells(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sample `cells` has few cells here: all 300 take seconds."""
+    """Make the sample `cells` with few cells, because all 300 take seconds."""
     few = partial(samples.write_cells, shape=(12, 30, 30))
     monkeypatch.setattr(samples, "write_cells", few)
 
@@ -128,10 +128,10 @@ def _run(trial: str, builds: tuple[Path, Path], place: Path, *more: str) -> int:
         (trial, kind)
         for trial in TRIALS
         for kind in ("a file", "a folder", "another build")
-        if kind != "another build" or trial not in OF_A_BUILD  # they go on with a build
+        if kind != "another build" or trial not in OF_A_BUILD  # commands on a build go on with it
     ],
 )
-def test_what_others_put_there_stays_and_is_named_before_any_work(
+def test_foreign_file_stays_and_is_named_before_any_work(
     builds: tuple[Path, Path],
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -187,7 +187,7 @@ def test_a_file_at_the_place_of_any_part_of_a_sample_stays(tmp_path: Path, name:
     assert main(["sample", sample, str(tmp_path / "mine.ome.zarr"), *small]) == 1
     assert [file.read_bytes() for file in tmp_path.rglob("*")] == [WORK]
     (tmp_path / name).unlink()
-    for _ in range(2):  # the second time it is there
+    for _ in range(2):  # the second time, the place exists
         assert main(["sample", sample, str(tmp_path / "mine.ome.zarr"), *small]) == 0
     assert {file.name for file in tmp_path.iterdir()} == {
         "mine.ome.zarr",
@@ -242,7 +242,7 @@ def test_text_beside_exported_voxels_is_guarded_before_the_work(
     assert (tmp_path / beside).read_bytes() == WORK
 
 
-def test_tissue_is_not_learned_where_the_bundle_is_of_somebody_else(
+def test_tissue_is_not_learned_if_the_bundle_is_foreign(
     builds: tuple[Path, Path],
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],

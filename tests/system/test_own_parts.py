@@ -1,4 +1,4 @@
-"""A build goes on in its own OUT alone: another input, and files that it did not write, stay."""
+"""A build goes on only in its own OUT. It keeps results of another input and foreign files."""
 
 import shutil
 from pathlib import Path
@@ -42,7 +42,7 @@ def _results(out: Path) -> dict[str, str]:
 # --- the plan
 
 
-def test_another_input_takes_an_out_by_force_alone_and_leaves_nothing_of_the_first(
+def test_another_input_replaces_an_out_only_by_force_and_completely(
     builds: Path, out: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     before = digests_of(out)
@@ -52,7 +52,7 @@ def test_another_input_takes_an_out_by_force_alone_and_leaves_nothing_of_the_fir
     assert f"{out}: holds a build of 'f' (fingerprint " in line
     assert "not of 'g'" in line
     assert "choose another OUT, or --force replaces it" in line
-    (out / "plan.json").unlink()  # what it was made of is known all the same
+    (out / "plan.json").unlink()  # other files still state the source
     assert main(["build", *words]) == 1
     assert "holds a build of another input (fingerprint" in error_line(capfd)
     shutil.copy(builds / "f" / "plan.json", out)
@@ -77,7 +77,7 @@ def test_other_settings_are_named_before_they_replace_results(
 
 
 @pytest.mark.parametrize("is_edit", [True, False])
-def test_settings_of_a_person_in_out_are_not_replaced(
+def test_users_own_settings_in_out_are_not_replaced(
     builds: Path, out: Path, capfd: pytest.CaptureFixture[str], is_edit: bool
 ) -> None:
     file = out / "stereocell.toml"
@@ -107,13 +107,13 @@ def test_part_that_somebody_else_wrote_stays_without_force(
     builds: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], phase: str, name: str
 ) -> None:
     out = shutil.copytree(builds / "f", tmp_path / "out")
-    whole = name == "thesis"  # a folder that is no bundle
+    whole = name == "thesis"  # this folder is not a bundle
     for part in [phase] if phase != "bundle" or whole else []:
         shutil.rmtree(out / part, ignore_errors=True)
     if phase in ("stage", "report"):
         (out / "phases.json").unlink()
     elif phase == "bundle" and not whole:
-        (out / "bundle" / "index.html").unlink()  # there is something to do
+        (out / "bundle" / "index.html").unlink()  # gives the command something to do
     own = out / ("bundle/thesis.tex" if whole else name)
     own.parent.mkdir(exist_ok=True)
     own.write_text(WORK)
@@ -127,7 +127,7 @@ def test_part_that_somebody_else_wrote_stays_without_force(
         assert phase == "stage" or not own.exists() or own.read_text("utf-8") != WORK
 
 
-def test_layer_that_was_edited_in_place_is_not_written_anew_without_force(
+def test_layer_edited_in_place_is_not_written_again_without_force(
     builds: Path, out: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     looks = out / "stage" / "looks" / "channels.usda"
@@ -200,7 +200,7 @@ def test_export_replaces_its_own_file_until_somebody_edits_it(
         assert main(["export", str(out), str(file), *more]) == 0
     assert [line for line in check(out) if not line.ok] == []
     capfd.readouterr()
-    assert main(["export", str(builds / "g"), str(file)]) == 1  # it is of another specimen
+    assert main(["export", str(builds / "g"), str(file)]) == 1  # the file shows another specimen
     assert "expected nothing or an earlier export of this build, as it was writ" in error_line(
         capfd
     )
@@ -214,7 +214,7 @@ def test_export_replaces_its_own_file_until_somebody_edits_it(
 
 
 @pytest.mark.parametrize("command", ["slices", "iso"])
-def test_pictures_are_replaced_by_those_of_the_same_source_alone(
+def test_pictures_are_replaced_only_by_those_of_the_same_source(
     builds: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], command: str
 ) -> None:
     place = tmp_path / ("iso.png" if command == "iso" else "slices")
@@ -252,7 +252,7 @@ def test_rebuild_is_refused_before_its_first_phase_writes(
     assert digests_of(out) == before
 
 
-def test_results_of_two_plans_pass_neither_check_nor_publish(
+def test_mixed_results_of_two_plans_fail_check_and_publish(
     builds: Path, out: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     site = tmp_path / "site"
@@ -272,7 +272,8 @@ def test_results_of_two_plans_pass_neither_check_nor_publish(
             assert main(["publish", str(source), str(site)]) == 1
             line = error_line(capfd)
             assert f"{stale}: made of another " in line
-            assert f"run `stereocell {stale} {out}" in line  # the build around the bundle, too
+            # The remedy names the build round the bundle, too.
+            assert f"run `stereocell {stale} {out}" in line
             assert line.endswith(f"stereocell report {out}`")
     assert not site.exists()
     assert main(["report", str(out)]) == 0

@@ -1,4 +1,4 @@
-"""A patient's sides, from the reader to the bundle: bodies lie where the letters say."""
+"""A patient's sides from the reader to the bundle: the letters state where bodies lie."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -32,7 +32,7 @@ from support.glbs import decoded_positions_m
 from support.nifti_files import write as write_nifti
 
 SHAPE = (16, 20, 18)
-LEVEL = 600  # above the other bodies' heights: a ball round the brightest is all that is left
+LEVEL = 600  # above the other bodies' heights, so only a ball of the brightest body remains
 LEFT_MM, POSTERIOR_MM, SUPERIOR_MM = BRIGHTEST
 Source = Callable[..., Path]
 
@@ -48,7 +48,7 @@ def dicom(folder: Path, affine: NDArray[np.float64]) -> Path:
 
 
 def orientations() -> list[Any]:
-    """All 48, of NIfTI and DICOM: in `make test` those whose storage is least like the world's."""
+    """Return all 48 orientations of NIfTI and DICOM; `make test` runs three of them."""
     cases = [(source, *case) for case in ORIENTATIONS for source in (nifti, dicom)]
     kept = [
         (nifti, (0, 1, 2), (1, 1, 1)),
@@ -69,7 +69,7 @@ def build(source: Path, out: Path) -> Path:
 
 
 def body_mm(bundle: Path) -> dict[str, float]:
-    """Return how far along each of the manifest's sides the surface's middle lies."""
+    """Return the place of the surface's middle along each of the manifest's sides, in mm."""
     (file,) = (bundle / "channels").rglob("lod0.glb")
     points = decoded_positions_m(file.read_bytes()) * 1e3
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -82,7 +82,7 @@ TRUTH = {"left": LEFT_MM, "posterior": POSTERIOR_MM, "superior": SUPERIOR_MM}
 
 @pytest.mark.parametrize("write", [nifti, dicom])
 @pytest.mark.parametrize(("order", "signs"), ORIENTATIONS)
-def test_the_reader_lays_voxels_to_the_sides_that_it_states(
+def test_voxels_run_to_the_sides_that_the_reader_states(
     write: Source, order: Sequence[int], signs: Sequence[int], tmp_path: Path
 ) -> None:
     dataset = read.open(write(tmp_path / "s", oriented(order, signs, SHAPE)))
@@ -90,10 +90,10 @@ def test_the_reader_lays_voxels_to_the_sides_that_it_states(
     voxels = whole(dataset).astype(np.float64)
     brightest = np.array(np.unravel_index(voxels.argmax(), voxels.shape))
     z, y, x = (brightest - (np.array(voxels.shape) - 1) / 2) * dataset.levels[0].spacing_um / 1e3
-    # canonical voxels run to anterior, inferior, left: the body lies in front, above, on the left
+    # Canonical voxels run to anterior, inferior, left. The body lies in front, above, on the left.
     assert (z, y, x) == pytest.approx((-POSTERIOR_MM, -SUPERIOR_MM, LEFT_MM), abs=1.3)
 
-    # and where the stage puts it, along the sides that the stage states
+    # The stage puts the body there, too, along the sides that it states.
     spacing_um = dataset.levels[0].spacing_um
     last_um = tuple((np.array(voxels.shape) - 1) * spacing_um)
     tile = TileExtent("r0_c0", (0.0, 0.0, 0.0), last_um, tuple(spacing_um))
@@ -116,7 +116,7 @@ def test_the_reader_lays_voxels_to_the_sides_that_it_states(
 
 
 @pytest.mark.parametrize(("write", "order", "signs"), orientations())
-def test_a_body_on_the_left_lies_at_the_letter_l_of_the_bundle(
+def test_body_on_the_left_lies_at_the_letter_l_of_the_bundle(
     write: Source, order: Sequence[int], signs: Sequence[int], tmp_path: Path
 ) -> None:
     source = write(tmp_path / "s", oriented(order, signs, SHAPE))
@@ -157,7 +157,7 @@ def _on_four_legs(ds: pydicom.Dataset) -> None:
     ds.AnatomicalOrientationType = "QUADRUPED"
 
 
-def test_sides_that_nothing_states_are_no_letters(tmp_path: Path) -> None:
+def test_unknown_sides_have_no_letters(tmp_path: Path) -> None:
     affine = grid(shape=SHAPE)
     guessed = write_nifti(tmp_path / "a.nii", affine, np.ones(SHAPE, np.int16), form="neither")
     write_series(tmp_path / "animal", affine, SHAPE, change=_on_four_legs)

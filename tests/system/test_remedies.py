@@ -1,4 +1,4 @@
-"""Damage to any file of a build: which commands notice it, and that printed remedies mend it."""
+"""Commands notice damage to any file of a build, and the printed remedies repair it."""
 
 import re
 import shutil
@@ -20,7 +20,7 @@ from support.outputs import make_build, make_source
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
 
 SOURCE = "f.ome.tif"
-# the documents of each part that a command may depend on
+# Documents of each part on which a command may depend
 DOCUMENTS = {
     "plan": ("plan.json", "provenance.json", "stereocell.toml"),
     "phases": ("phases.json",),
@@ -43,7 +43,7 @@ def out(built: Path, tmp_path: Path) -> Path:
 
 
 def _change(file: Path) -> None:
-    """Change a letter or digit near the middle: JSON and TOML stay what they are."""
+    """Change a letter or digit near the middle, so that JSON and TOML stay valid."""
     data = bytearray(file.read_bytes())
     after = range(len(data) // 2, len(data))
     place = next(k for k in after if data[k : k + 1].isalnum())
@@ -58,10 +58,10 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 }
 
 
-# --- commands ask the documents that they depend on
+# --- commands check the documents on which they depend
 
 
-def test_every_command_that_reads_a_build_and_writes_names_what_it_depends_on() -> None:
+def test_commands_that_read_a_build_and_write_name_their_documents() -> None:
     reading = {name for name, one in PLACES.items() if Kind.BUILD in one.reads and one.writes}
     assert set(NEEDS) == reading
     assert {part for parts in NEEDS.values() for part in parts} == DOCUMENTS.keys()
@@ -95,7 +95,7 @@ def test_command_refuses_a_build_whose_documents_are_damaged(
     "name", ["specimen.usdz", "looks/F_default.exr", "looks/F_level.json", "tiles/r0_c0/F.vdb"]
 )
 @pytest.mark.parametrize("damage", ["changed", "lost"])
-def test_bundle_names_a_file_of_the_stage_that_is_lost_or_damaged(
+def test_bundle_names_a_missing_or_damaged_file_of_the_stage(
     out: Path, capfd: pytest.CaptureFixture[str], name: str, damage: str
 ) -> None:
     DAMAGES[damage](out / "stage" / name)
@@ -110,7 +110,7 @@ def test_bundle_names_a_file_of_the_stage_that_is_lost_or_damaged(
 
 
 def _follow(out: Path, told: list[str], *, damaged: Path, source: Path) -> None:
-    """Do what the lines of `check` say, and nothing else."""
+    """Run the remedies that `check` prints, and nothing else."""
     if any(re.search(r"remove (it|what is damaged)", line) for line in told):
         damaged.unlink(missing_ok=True)
     named = {name for line in told for name in re.findall(r"stereocell (\w+) (?:OUT|INPUT)", line)}
@@ -125,7 +125,7 @@ def _told(out: Path) -> list[str]:
 
 
 def _names(out: Path) -> list[str]:
-    """Return one file of each kind: all JSON files, and of others one of each ending in a part."""
+    """Return all JSON files, and one file of each other ending in each part."""
     first: dict[object, str] = {}
     for file in sorted(out.rglob("*")):
         path = file.relative_to(out)
@@ -136,9 +136,9 @@ def _names(out: Path) -> list[str]:
     return list(first.values())
 
 
-# one damage a kind of file, in turn; all of them in the sweep
+# Each kind of file has one of the damages, in turn; the sweep tries all of them.
 @pytest.mark.parametrize("turn", sweep([0, 1, 2], kept=[0]))
-def test_remedies_that_check_prints_mend_what_they_name(
+def test_remedies_that_check_prints_repair_the_damage(
     built: Path, tmp_path: Path, turn: int
 ) -> None:
     unnoticed = []
@@ -152,7 +152,7 @@ def test_remedies_that_check_prints_mend_what_they_name(
         _follow(out, told, damaged=out / name, source=built.parent / SOURCE)
         assert _told(out) == [], f"{name} {kind}: {told}"
         shutil.rmtree(out)
-    # no result rests on these: they say how long a unit took, and which tiles need no work
+    # No result depends on these files: seconds of a unit, and tiles that need no work.
     kept = {"seconds.json", "stage.json", "exports.json"}
     assert {Path(name).name for name in unnoticed} <= kept
 
@@ -175,7 +175,7 @@ def test_damaged_record_of_the_phases_has_one_remedy(
 
 
 @pytest.mark.parametrize("lost", [["manifest.json"], ["manifest.json", "files.json"]])
-def test_bundle_that_lost_its_manifest_is_made_anew_and_files_of_others_stay(
+def test_bundle_without_its_manifest_is_made_again_and_foreign_files_stay(
     out: Path, built: Path, capfd: pytest.CaptureFixture[str], lost: list[str]
 ) -> None:
     for name in lost:

@@ -1,4 +1,4 @@
-"""What is done stays done, and what was lost, cut, edited or killed is seen."""
+"""Finished results stay, and missing, cut, edited or interrupted ones are noticed."""
 
 import json
 import shutil
@@ -43,7 +43,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def out(built: Path, tmp_path: Path) -> Path:
-    """A copy of a finished build, whose source lies at the same place."""
+    """A copy of a finished build; its source is the original one."""
     return shutil.copytree(built, tmp_path / "out")
 
 
@@ -62,7 +62,7 @@ def _cut(file: Path) -> None:
 
 
 def _go_on(out: Path) -> None:
-    """Run the phases anew, but for the report, which takes longest."""
+    """Run the phases again, except the report, which takes longest."""
     for phase in ("units", "stage", "bundle"):
         assert main([phase, str(out), "--workers", "0"]) == 0
 
@@ -89,7 +89,8 @@ def test_cut_file_is_made_again(out: Path, built: Path, name: str) -> None:
     if name.startswith("report"):
         assert main(["report", str(out)]) == 0
     _go_on(out)
-    assert abs(file.stat().st_size - size) < 100  # seconds in it may have other digits
+    # Measured seconds in the file may have other digits.
+    assert abs(file.stat().st_size - size) < 100
     assert _same(out, built)
 
 
@@ -147,7 +148,7 @@ def test_cut_unit_file_is_named_with_the_remedy(
     assert f"run `stereocell units {out}`" in line
 
 
-def test_report_says_on_what_the_seconds_of_a_partial_run_were_spent(out: Path) -> None:
+def test_report_states_how_a_partial_run_spent_its_time(out: Path) -> None:
     shutil.rmtree(_unit(out))
     only = "/".join(UNIT)
     assert main(["units", str(out), "--workers", "0", "--only", only]) == 0
@@ -161,7 +162,7 @@ def test_source_that_was_replaced_since_the_plan_is_refused(
     source, out = _source(tmp_path), tmp_path / "out"
     assert main(["plan", str(source), "-o", str(out)]) == 0
     phantoms.write_ome_tiff(source, np.stack([phantoms.f_phantom()[:, :, ::-1]] * 2), "CZYX")
-    open_source.cache_clear()  # as in a process of its own
+    open_source.cache_clear()  # as if the command ran in its own process
     capsys.readouterr()
     assert main(["units", str(out), "--workers", "0"]) == 1
     assert "f: changed since it was planned" in capsys.readouterr().err
@@ -175,7 +176,7 @@ def test_source_that_was_replaced_since_the_plan_is_refused(
         (["--time", "1"], "with --time 0, not 1"),
     ],
 )
-def test_used_out_names_the_flag_that_makes_another_input(
+def test_used_out_names_the_flag_for_another_input(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], words: str
 ) -> None:
     voxels = np.stack([phantoms.f_phantom(), phantoms.f_phantom()[:, ::-1]])
@@ -205,7 +206,7 @@ def test_stage_that_was_not_finished_is_not_exported(
     assert main(["bundle", str(out), "--workers", "0"]) == 0
 
 
-def test_one_unit_s_run_says_how_many_are_missing(
+def test_run_of_one_unit_prints_how_many_are_missing(
     tmp_path: Path, source: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--grid", "2x1"]) == 0
@@ -213,8 +214,8 @@ def test_one_unit_s_run_says_how_many_are_missing(
     assert "units: 3 of 4 units are not built yet" in capsys.readouterr().err
 
 
-# The command, which interrupts itself and its worker once that writes: however slow the
-# machine is, it is not done then, for it waits before its last file.
+# The command interrupts itself and its worker when the worker writes. Even on a slow machine the
+# phase is not done by then, because the worker waits before its last file.
 _INTERRUPTED = """
 import os, signal, sys, threading, time
 from pathlib import Path
@@ -243,7 +244,8 @@ sys.exit(main(["bundle", str(out), "--workers", "1"]))
     [
         (ctrl_c.heeded, "SIGINT", 130),
         pytest.param(ctrl_c.heeded, "SIGTERM", 143, marks=pytest.mark.exhaustive),
-        (ctrl_c.ignored, "SIGINT, then SIGTERM", 143),  # in the background it stays ignored
+        # A process in the background keeps ignoring SIGINT.
+        (ctrl_c.ignored, "SIGINT, then SIGTERM", 143),
     ],
 )
 def test_interrupted_bundle_stops_at_once_and_leaves_nothing_half_written(

@@ -1,4 +1,4 @@
-"""Each record of a build has a hash, and is checked by the same code when written and read."""
+"""Each record of a build has a hash; the same code checks records when writing and reading."""
 
 import json
 import re
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
 
 RECORDS = ("plan.json", "provenance.json", SETTINGS, "phases.json", "report/index.html")
 OF_UNITS = ("units/plan.key", "units/done.json", "units/survey.json")
-# commands that read OUT, and would build from it
+# Commands that read OUT, and would build from it
 COMMANDS = (
     ["units"],
     ["units", "--only", "r0_c0/F"],
@@ -55,14 +55,14 @@ def _faults(out: Path) -> str:
 
 
 def _change(file: Path) -> None:
-    """Change the last digit or letter of a file that stands before its last 160 bytes."""
+    """Change the last digit or letter before a file's last 160 bytes."""
     data = bytearray(file.read_bytes())
     for place in range(max(len(data) - 160, len(data) // 2), 0, -1):
         if not data[place : place + 1].isalnum():
             continue
         changed = bytearray(data)
         changed[place] = ord("1") if data[place] != ord("1") else ord("2")
-        if file.suffix != ".json" or _is_json(changed):  # `true` with a digit in it is none
+        if file.suffix != ".json" or _is_json(changed):  # `true` with a digit in it is not JSON
             break
     file.write_bytes(changed)
 
@@ -100,7 +100,7 @@ def test_changed_record_is_named_with_what_was_found_and_expected(out: Path, nam
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
-def test_plan_of_an_earlier_version_is_answered_by_the_remedy(
+def test_plan_of_an_earlier_version_is_refused_with_the_remedy(
     out: Path, built: Path, capfd: pytest.CaptureFixture[str], command: list[str]
 ) -> None:
     plan = json.loads((out / "plan.json").read_bytes())
@@ -110,7 +110,7 @@ def test_plan_of_an_earlier_version_is_answered_by_the_remedy(
     line = error_line(capfd)
     assert "plan.json: found no hash of its content" in line
     assert "an earlier version wrote it" in line
-    (out / "plan.json").unlink()  # the remedy
+    (out / "plan.json").unlink()  # carries out the remedy
     assert main(["plan", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]) == 0
     assert (out / "plan.json").read_bytes() == (built / "plan.json").read_bytes()
 
@@ -147,9 +147,7 @@ def test_phases_that_were_changed_by_hand_are_named_and_done_again(
     assert "damaged" not in capfd.readouterr().err
 
 
-def test_units_of_another_plan_are_not_taken_for_those_of_this_one(
-    out: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_units_of_another_plan_are_not_used(out: Path, capfd: pytest.CaptureFixture[str]) -> None:
     edit_sealed(OutFolder(out).units_plan_file, lambda signed: signed.update(key="0123abcd"))
     assert main(["stage", str(out), "--workers", "0"]) == 1
     assert f"not built for the plan in plan.json: run `stereocell units {out}`" in error_line(capfd)
@@ -184,7 +182,7 @@ def test_remedy_for_a_missing_record_does_not_ask_to_remove_it(out: Path, name: 
 def test_every_json_file_of_a_build_has_a_row_in_the_table_of_documents(built: Path) -> None:
     for file in [*built.rglob("*.json"), built / "units" / "plan.key"]:
         schema_of(file.name)
-        write_bytes(file, file.read_bytes())  # as it is, it may be written
+        write_bytes(file, file.read_bytes())  # the unchanged content may be written
 
 
 def _a_name(pattern: str) -> str:

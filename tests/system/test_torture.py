@@ -1,6 +1,6 @@
-"""A little of what `make torture` does: a kill or two, in phases whose results come together last.
+"""A small part of `make torture`: kills in phases whose results come together last.
 
-Of the command alone tells test_resume.py too, of a worker engine/test_run.py.
+test_resume.py also interrupts the command alone, and engine/test_run.py kills a worker.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ SESSION = {"session": "stage"}
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kills", "workers"),
-    # of one worker and its command a kill of all differs in nothing but the seconds
+    # With one worker, killing all processes differs from killing the command only in its time.
     sweep([(SESSION, 1), (SESSION | {"scheduler": "bundle"}, 2)], kept=[(SESSION, 1)]),
 )
 def test_killed_at_any_moment_a_build_goes_on_to_the_same_bytes(

@@ -19,7 +19,7 @@ PHASES = ("plan", "units", "stage", "bundle", "report")
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a source and its finished build, made by a process as a user starts one."""
+    """A folder with a source and its finished build, which a process of its own made."""
     folder = tmp_path_factory.mktemp("build")
     phantoms.write_ome_tiff(folder / "f.ome.tif", phantoms.f_phantom())
     _run(folder, "stereocell.cli", *BUILD)
@@ -41,7 +41,7 @@ def _run(folder: Path, *command: str) -> list[str]:
 
 
 def _run_rewritten(folder: Path, *command: str) -> list[str]:
-    """Run a command of StereoCell by rewritten code; return the lines that it printed."""
+    """Run a command of StereoCell with rewritten code; return the lines that it printed."""
     lines = _run(folder, "support.rewritten_source", *command)
     modules, variables, calls = next(
         map(int, line.split()[1:]) for line in lines if line.startswith("rewritten: ")
@@ -53,7 +53,7 @@ def _run_rewritten(folder: Path, *command: str) -> list[str]:
 
 
 def _times(folder: Path) -> dict[str, int]:
-    """Return when each result was written: documents that list results are written each time."""
+    """Return when each result was written, without documents that every run writes again."""
     lists = {"survey.json", "done.json", "plan.key"}
     return {
         str(file): file.stat().st_mtime_ns
@@ -63,19 +63,20 @@ def _times(folder: Path) -> dict[str, int]:
     }
 
 
-def test_results_stay_valid_by_rewritten_code_without_another_result(built: Path) -> None:
-    """Every comment, docstring, log line and name of a local variable differs."""
+def test_results_stay_valid_if_rewritten_code_gives_the_same_results(built: Path) -> None:
+    """The rewritten code has other comments, docstrings, log lines and local variables."""
     digests, times = digests_of(built / "out"), _times(built)
     lines = _run_rewritten(built, *BUILD)
     assert [line for line in lines if line.endswith("up to date")] == [
         f"{phase}: up to date" for phase in PHASES
     ]
-    assert not [line for line in lines if "1/" in line.partition(" ")[2][:2]]  # progress of a step
+    # Progress lines would mean that a step did work.
+    assert not [line for line in lines if "1/" in line.partition(" ")[2][:2]]
     assert _times(built) == times
     assert digests_of(built / "out") == digests
 
 
-def test_a_raised_version_makes_results_of_that_step_again(built: Path) -> None:
+def test_results_of_a_step_are_made_again_after_its_version_is_raised(built: Path) -> None:
     lines = _run_rewritten(built, "--raise=BuildUnit", "units", "out", "--workers", "0")
     assert [line for line in lines if line.startswith("units: 1/2")]
     for other in ("windows", "evidence", "components"):

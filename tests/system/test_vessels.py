@@ -1,4 +1,4 @@
-"""The preset for vessels: a tree from a wide trunk to branches as thin as a voxel stays whole."""
+"""The preset for vessels keeps a tree whole, from a wide trunk to branches one voxel thin."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -25,8 +25,9 @@ BLOOD, TISSUE, NOISE, BLUR = 400.0, 60.0, 6.0, 1.1  # voxel values; voxels
 def _tree() -> tuple[NDArray[np.uint16], NDArray[np.int64]]:
     """Return an angiogram, and the voxels of its centre lines (n, 3).
 
-    A trunk of 1.8 voxels' radius forks five times; each branch has 2^(-1/3) of its parent's radius,
-    by Murray's law, so that the last ones are a voxel wide. They are spheres drawn on a finer grid.
+    A trunk with a radius of 1.8 voxels forks five times. By Murray's law, a branch's radius is
+    2^(-1/3) times its parent's, so the last branches are a voxel wide. Branches are drawn as
+    spheres on a finer grid.
     """
     rng = np.random.default_rng(8)
     fine = np.zeros(tuple(2 * n for n in SHAPE), np.float32)
@@ -83,7 +84,7 @@ def _built(voxels: NDArray[np.uint16], folder: Path, preset: str) -> ChannelSurv
 def _kept(
     voxels: NDArray[np.uint16], centres: NDArray[np.int64], found: ChannelSurvey
 ) -> tuple[float, float]:
-    """Return the share of the tree's centre lines and of all voxels within the largest solid."""
+    """Return the shares of the centre lines and of all voxels that are in the largest solid."""
     spacing = (500.0, 500.0, 500.0)
     level = found.appearance.level
     assert level is not None
@@ -94,7 +95,7 @@ def _kept(
     return float((labels[tuple(centres.T)] == largest).mean()), float((labels > 0).mean())
 
 
-def test_thin_branches_stay_on_the_tree(
+def test_thin_branches_stay_connected_to_the_tree(
     tree: tuple[NDArray[np.uint16], NDArray[np.int64]], tmp_path: Path
 ) -> None:
     voxels, centres = tree
@@ -108,7 +109,7 @@ def test_thin_branches_stay_on_the_tree(
 
 
 def _sums(*added: tuple[int, int, int, int]) -> list[dict[str, dict[str, int]]]:
-    """Return sums of one tile at each level: all voxels, main ones, new ones, those apart."""
+    """Return sums of one tile at each level: all voxels, main, new, and separate ones."""
     names = ("voxels", "main_voxels", "new_voxels", "apart_voxels")
     return [{"r0_c0": dict(zip(names, one, strict=True))} for one in added]
 
@@ -126,7 +127,7 @@ def _of(*masks: NDArray[np.bool_]) -> list[dict[str, dict[str, int]]]:
     return [{"r0_c0": asdict(one)} for one in sums]
 
 
-def test_a_level_that_only_thickens_vessels_is_not_taken() -> None:
+def test_level_that_only_thickens_vessels_is_not_chosen() -> None:
     assert choose_connected(_of(_tube(4), _tube(4.8), _tube(5.5))) == 0
 
 
@@ -136,20 +137,20 @@ def test_a_branch_is_found_below_levels_that_only_thicken_vessels() -> None:
     assert choose_connected(_of(_tube(4), _tube(4.8), _tube(5.2), branched)) == 3
 
 
-def test_a_level_that_adds_branches_is_taken_until_tissue_joins() -> None:
+def test_levels_that_add_branches_are_chosen_until_tissue_joins() -> None:
     branches = (1000, 900, 0, 0), (1100, 1100, 50, 0), (1250, 1200, 40, 0)
     assert choose_connected(_sums(*branches, (9000, 8000, 5000, 0))) == 2
 
 
-def test_tissue_that_comes_up_beside_vessels_ends_the_search() -> None:
+def test_tissue_that_appears_beside_vessels_ends_the_search() -> None:
     beside = _tube(5.2)
     beside[10:20, 2:8, 2:8] = True
     longer = _tube(5.2, 70) | beside
     assert choose_connected(_of(_tube(4), _tube(4.8), beside, longer)) == 0
 
 
-def test_pieces_that_hang_on_no_vessel_add_no_branch() -> None:
-    """A wide vessel with soft edges, in tissue that gets loose above each lower level."""
+def test_pieces_apart_from_vessels_do_not_count_as_branches() -> None:
+    """A wide vessel with soft edges; at each lower level, separate pieces of tissue appear."""
     rng = np.random.default_rng(4)
     _, y, x = np.indices((40, 64, 64))
     tube = ndimage.gaussian_filter((np.hypot(y - 32, x - 32) < 10).astype(float), 2.0)

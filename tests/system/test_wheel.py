@@ -1,4 +1,4 @@
-"""The wheel and the sdist as they are made; test_empty_environment.py installs the wheel."""
+"""Building the wheel and the sdist; test_empty_environment.py installs the wheel."""
 
 import shutil
 import tarfile
@@ -41,7 +41,7 @@ def test_an_sdist_makes_the_same_wheel_without_node(tmp_path: Path) -> None:
     assert "Operating System :: POSIX :: Linux" in told.classifiers
 
 
-def test_without_the_viewer_there_is_no_wheel(tmp_path: Path) -> None:
+def test_wheel_is_not_built_without_the_viewer(tmp_path: Path) -> None:
     checkout = tmp_path / "checkout"
     for name in ("pyproject.toml", "README.md", "LICENSE", "pipeline/wheel_hook.py"):
         (checkout / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
-"""Sample, build with its report, check, export, publish and serve take nothing that Windows lacks.
+"""Sample, build with its report, check, export, publish and serve work without what Windows lacks.
 
-A stand-in for that system, which no test of ours runs on: support/without_posix says what it hides.
+No test runs on Windows itself. support/without_posix stands in for it, and states what it hides.
 """
 
 import json
@@ -29,7 +29,7 @@ for words in json.loads(sys.argv[1]):
 
 
 def start(folder: Path, *commands: list[str]) -> subprocess.Popen[str]:
-    """Start a process that runs commands one after the other, up to the first that fails."""
+    """Start a process that runs commands one after another, up to the first failure."""
     return subprocess.Popen(
         [sys.executable, "-X", "warn_default_encoding", "-c", RUN, json.dumps(commands)],
         cwd=folder,
@@ -41,13 +41,13 @@ def start(folder: Path, *commands: list[str]) -> subprocess.Popen[str]:
 
 
 @pytest.mark.slow
-def test_all_runs_on_what_windows_has(tmp_path: Path) -> None:
+def test_commands_run_with_what_windows_has(tmp_path: Path) -> None:
     z, y, x = np.indices((12, 24, 24))
     body = np.where((z - 6) ** 2 + ((y - 12) / 2) ** 2 + ((x - 12) / 2) ** 2 < 12, 200, 20)
     tifffile.imwrite(
         tmp_path / "two.ome.tif",
         np.stack([body, body[:, ::-1]]).astype(np.uint8),
-        # a device of Windows', and characters that its file names lack
+        # a device of Windows, and characters that its file names can't have
         metadata={"axes": "CZYX", "Channel": {"Name": ["NUL", 'a:b? "c".']}},
     )
     with start(
@@ -58,7 +58,7 @@ def test_all_runs_on_what_windows_has(tmp_path: Path) -> None:
         *(["export", "out", f"a.{ending}"] for ending in ("glb", "3mf", "usdc", "nii.gz")),
         ["export", "out", "a.png", "--width", "200"],
         ["export", "out", "a.precomputed"],
-        ["export", "out", "a.precomputed", "--bits", "8"],  # in place of the first
+        ["export", "out", "a.precomputed", "--bits", "8"],  # replaces the first export
         ["publish", "out", "site"],
         ["publish", "out", "site"],
     ) as process:

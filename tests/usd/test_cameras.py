@@ -1,4 +1,4 @@
-"""The stage's cameras frame what shows, as the viewer does."""
+"""The stage's cameras frame the visible content, as the viewer does."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -53,8 +53,8 @@ def test_a_small_surface_in_a_large_box_fills_the_picture(tmp_path: Path) -> Non
     assert 0.7 < reach <= 1
 
 
-def test_a_shown_volume_without_a_surface_is_seen_whole(tmp_path: Path) -> None:
-    """Nothing says where in its box the volume has something to show."""
+def test_visible_volume_without_a_surface_is_framed_whole(tmp_path: Path) -> None:
+    """The whole box is framed, because it is unknown where the volume has visible voxels."""
     camera = mono_of(write_showing(tmp_path, BALL_ID, EMPTY_ID))
     depth, height, width = np.array(SPACING_UM) * (np.array(SHAPE) - 1)
     corners = np.array([(x, -y, depth) for x in (0, width) for y in (0, height)])
@@ -63,7 +63,7 @@ def test_a_shown_volume_without_a_surface_is_seen_whole(tmp_path: Path) -> None:
 
 
 def test_the_eye_stands_in_front_of_the_whole_box() -> None:
-    """The volumes of a box fill it, although a speck in its middle is all that is framed."""
+    """The framed content is only a speck, but volumes fill their whole box."""
     stage = new_stage(".usda", ROOT.name)
     box = np.array([[0.0, 0.0, 0.0], [100.0, 100.0, 100.0]])
     define_cameras(stage, box, np.array([[49.0, 49.0, 49.0], [51.0, 51.0, 51.0]]))

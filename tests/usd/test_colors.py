@@ -1,4 +1,4 @@
-"""Shaders repeat a channel's colour for programs that follow no connection; one edit changes it.
+"""Shaders repeat a channel's colour for programs that ignore connections; one edit changes it.
 
 Blender's importer and the renderer Storm draw it in tests/blender.
 """
@@ -45,7 +45,7 @@ def edited(stage_path: Path, tmp_path: Path) -> Callable[[dict[str, Gf.Vec3f]], 
 
 
 def colors_read(path: Path) -> dict[str, tuple[float, ...]]:
-    """Return the colours that the bundle has: the channel's and that of its mesh in each tile."""
+    """Return the bundle's colours of the channel, and of its mesh in each tile."""
     stage = open_stage(path)
     found = {"channel": read_appearances(stage)[0].color}
     for tile in TILES:
@@ -56,7 +56,7 @@ def colors_read(path: Path) -> dict[str, tuple[float, ...]]:
 
 
 def plain_color(path: Path, tile: str, channel: str) -> Gf.Vec3f:
-    """Return the colour of a mesh for a program that reads its shader's own values alone."""
+    """Return the colour of a mesh for a program that reads only the values in its shader."""
     stage = Usd.Stage.Open(str(path))
     mesh = stage.GetPrimAtPath(leaf(tile, channel))
     material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()

@@ -1,4 +1,4 @@
-"""display.usda shows the stage at a size that stands beside everyday things."""
+"""display.usda shows the stage at the size of everyday things."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def display_of(stage_path: Path) -> Usd.Stage:
 
 
 def bounds(prim: Usd.Prim) -> NDArray[np.float64]:
-    """Return the least and the largest corner in the world, (2, 3)."""
+    """Return the lowest and the highest corner in the world, (2, 3)."""
     boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
     found = boxes.ComputeWorldBound(prim).ComputeAlignedRange()
     return np.array([found.GetMin(), found.GetMax()])
@@ -45,7 +45,7 @@ def test_surfaces_are_enlarged_by_a_transform(stage_path: Path) -> None:
     np.testing.assert_allclose(metres, um * 1e-6 * SCALE, rtol=1e-6)
 
 
-def test_an_edit_of_a_channel_reaches_its_surfaces_there(stage_path: Path) -> None:
+def test_edit_of_a_channel_reaches_its_surfaces_in_display_usda(stage_path: Path) -> None:
     display = display_of(stage_path)
     mesh = display.GetPrimAtPath(at_display(leaf("r0_c0", F_ID)))
     material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
@@ -57,7 +57,7 @@ def test_an_edit_of_a_channel_reaches_its_surfaces_there(stage_path: Path) -> No
     assert color.Get() == Gf.Vec3f(0, 1, 0)
 
 
-def test_its_cameras_see_the_specimen_as_those_of_the_stage(stage_path: Path) -> None:
+def test_cameras_see_the_specimen_like_those_of_the_stage(stage_path: Path) -> None:
     true, display = Usd.Stage.Open(str(stage_path)), display_of(stage_path)
     cameras = [prim for prim in display.Traverse() if prim.IsA(UsdGeom.Camera)]
     assert [str(prim.GetPath()) for prim in cameras] == [
@@ -73,7 +73,9 @@ def test_its_cameras_see_the_specimen_as_those_of_the_stage(stage_path: Path) ->
         assert there.frustum.window.GetSize() == pytest.approx(here.frustum.window.GetSize())
 
 
-def test_it_is_valid_and_follows_a_moved_folder(stage_path: Path, tmp_path: Path) -> None:
+def test_display_stage_is_valid_and_follows_a_moved_folder(
+    stage_path: Path, tmp_path: Path
+) -> None:
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     found = UsdValidation.ValidationContext(validators).Validate(display_of(stage_path))
     assert [error.GetMessage() for error in found] == []
@@ -82,7 +84,7 @@ def test_it_is_valid_and_follows_a_moved_folder(stage_path: Path, tmp_path: Path
     assert "10000 times the specimen, whose size is 9 x 12 x 8 um" in layer.documentation
 
 
-def test_its_root_states_the_asset_as_that_of_the_stage_does(stage_path: Path) -> None:
+def test_root_states_the_same_asset_as_the_stage(stage_path: Path) -> None:
     true, display = Usd.Stage.Open(str(stage_path)), display_of(stage_path)
     ours, theirs = (Usd.ModelAPI(one.GetDefaultPrim()) for one in (true, display))
     assert theirs.GetAssetVersion() == ours.GetAssetVersion() != ""
@@ -92,7 +94,7 @@ def test_its_root_states_the_asset_as_that_of_the_stage_does(stage_path: Path) -
 
 
 @pytest.mark.parametrize("arc", ["sublayer", "reference"])
-def test_a_layer_over_it_is_refused_by_the_name_of_the_stage(
+def test_layer_over_display_usda_is_refused_with_the_name_of_the_stage(
     stage_path: Path, tmp_path: Path, arc: str
 ) -> None:
     layer = Sdf.Layer.CreateNew(str(tmp_path / "mine.usda"))

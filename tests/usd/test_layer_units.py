@@ -1,4 +1,4 @@
-"""A layer over the stage without units, or with other ones, is reported with the lines to write."""
+"""A layer over the stage with no or other units is reported, with the lines to write."""
 
 from pathlib import Path
 
@@ -83,7 +83,7 @@ def test_another_unit_axis_or_prim_is_refused_with_the_line_to_write(
         ('upAxis = "Z"', "upAxis is Z, expected Y"),
     ],
 )
-def test_units_of_a_sublayer_of_the_layer_are_refused_too(
+def test_wrong_units_of_a_sublayer_are_also_refused(
     stage_path: Path, tmp_path: Path, fields: str, remedy: str
 ) -> None:
     inner = tmp_path / "inner.usda"
@@ -97,7 +97,7 @@ def test_units_of_a_sublayer_of_the_layer_are_refused_too(
     assert str(caught.value).startswith(f"{inner}: {remedy}: write ")
 
 
-def test_the_default_prim_of_a_sublayer_is_its_own(stage_path: Path, tmp_path: Path) -> None:
+def test_sublayer_may_have_its_own_default_prim(stage_path: Path, tmp_path: Path) -> None:
     (tmp_path / "inner.usda").write_text('#usda 1.0\n(defaultPrim = "Rig")\ndef "Rig" {}\n')
     layer = tmp_path / "edit.usda"
     layer.write_text(f"{HEAD}subLayers = [@./inner.usda@, @{stage_path}@])\n")

@@ -1,4 +1,4 @@
-"""The stage's own lights make the specimen neither black nor white, by UsdLux's definitions."""
+"""By UsdLux's definitions, the stage's lights make the specimen neither black nor white."""
 
 import io
 import zipfile
@@ -18,8 +18,8 @@ from stereocell.usd.write_usdz import write_usdz
 from support.stages import HEAD, write_whole
 
 ROOT = Path(__file__).parents[2]
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec. 709
-ALBEDO = 0.5  # a mid grey, matt surface
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # weights of linear Rec. 709
+ALBEDO = 0.5  # reflectance of a mid grey, matt surface
 LIGHTS = "/Specimen/Lights"
 
 
@@ -29,7 +29,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read_image(asset: Sdf.AssetPath) -> NDArray[np.float64]:
-    """Return a dome's image, (height, width, 3), from a folder or from inside a usdz."""
+    """Return a dome's image, (height, width, 3), from a folder or a usdz."""
     package, _, inner = asset.resolvedPath.partition("[")
     if not inner:
         return np.array(OpenEXR.File(package).channels()["RGB"].pixels, np.float64)
@@ -63,7 +63,7 @@ def irradiance(stage: Usd.Stage, normal: NDArray[np.float64]) -> NDArray[np.floa
             continue
         assert prim.IsA(UsdLux.DistantLight)
         half = np.radians(UsdLux.DistantLight(prim).GetAngleAttr().Get() / 2)
-        size = np.pi * np.sin(half) ** 2  # what `normalize` divides by
+        size = np.pi * np.sin(half) ** 2  # divisor of `normalize`
         if light.GetNormalizeAttr().Get():
             radiance = radiance / size
         towards = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))[2, :3]
@@ -76,12 +76,12 @@ def luminance(stage: Usd.Stage) -> float:
     return float(ALBEDO / np.pi * irradiance(stage, np.array([0.0, 0, 1])) @ LUMINANCE)
 
 
-def test_a_grey_surface_is_lit_neither_too_little_nor_too_much(stage_path: Path) -> None:
+def test_grey_surface_is_neither_too_dark_nor_too_bright(stage_path: Path) -> None:
     assert 0.15 < luminance(Usd.Stage.Open(str(stage_path))) < 0.7
 
 
 def test_each_distant_light_makes_the_specimen_brighter(stage_path: Path) -> None:
-    """Without `normalize`, a light of 2 degrees is divided by a thousand."""
+    """Without `normalize`, a light of 2 degrees would be a thousand times weaker."""
     stage = Usd.Stage.Open(str(stage_path))
     whole = luminance(stage)
     for name in ("key", "fill"):
@@ -91,7 +91,7 @@ def test_each_distant_light_makes_the_specimen_brighter(stage_path: Path) -> Non
         light.SetActive(True)
 
 
-def test_the_image_of_the_dome_is_that_of_the_viewers_studio() -> None:
+def test_image_of_the_dome_is_the_viewers_studio() -> None:
     studio = (ROOT / "viewer_gltf/public/environments/studio.hdr").read_bytes()
     image = OpenEXR.File(str(find_asset("usd_assets/studio.exr"))).channels()["RGB"].pixels
     np.testing.assert_array_equal(image, imagecodecs.rgbe_decode(studio))
@@ -105,8 +105,8 @@ def test_the_usdz_has_the_same_light(stage_path: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(irradiance(small, normal), irradiance(built, normal), rtol=0.01)
 
 
-def test_an_image_with_the_sun_in_it_stays_as_it_is(stage_path: Path, tmp_path: Path) -> None:
-    """8 bits would leave nothing but the sun."""
+def test_image_with_the_sun_is_copied_unchanged(stage_path: Path, tmp_path: Path) -> None:
+    """In 8 bits, only the sun would remain visible."""
     pixels = np.full((8, 16, 3), 0.1, np.float32)
     pixels[2, 3] = 5000
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
@@ -121,7 +121,7 @@ def test_an_image_with_the_sun_in_it_stays_as_it_is(stage_path: Path, tmp_path: 
 
 
 @pytest.mark.parametrize("edit", ["active = false", 'token visibility = "invisible"'])
-def test_lights_that_are_not_drawn_are_left_out_of_the_usdz(
+def test_inactive_and_hidden_lights_are_not_in_the_usdz(
     stage_path: Path, tmp_path: Path, edit: str
 ) -> None:
     path = tmp_path / "edit.usda"

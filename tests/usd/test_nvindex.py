@@ -1,4 +1,4 @@
-"""nvindex.usda has the channels' transfer functions in the terms of NVIDIA IndeX."""
+"""nvindex.usda has the channels' transfer functions in the schema of NVIDIA IndeX."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Usd.Stage:
     return Usd.Stage.Open(str(path.with_name("nvindex.usda")))
 
 
-def test_it_is_the_stage_and_turns_its_renderer_on(stage: Usd.Stage) -> None:
+def test_nvindex_usda_is_the_stage_and_enables_the_renderer(stage: Usd.Stage) -> None:
     assert stage.GetCompositionErrors() == []
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1e-6
     assert stage.GetDefaultPrim().GetPath() == "/Specimen"
@@ -26,7 +26,7 @@ def test_it_is_the_stage_and_turns_its_renderer_on(stage: Usd.Stage) -> None:
 
 @pytest.mark.parametrize("function", FUNCTIONS)
 @pytest.mark.parametrize(("channel", "color"), [(F_ID, COLORS[0]), (BALL_ID, COLORS[1])])
-def test_a_volume_finds_the_colour_map_of_its_function(
+def test_volume_has_the_colour_map_of_its_transfer_function(
     stage: Usd.Stage, channel: str, color: tuple[float, ...], function: str
 ) -> None:
     place = f"/Specimen/Channels/{channel}"
@@ -51,7 +51,7 @@ def test_a_volume_finds_the_colour_map_of_its_function(
         assert np.allclose(rgba[:, :3], color)
 
 
-def test_a_bundle_of_it_is_that_of_the_stage(tmp_path: Path) -> None:
+def test_bundle_of_nvindex_usda_is_that_of_the_stage(tmp_path: Path) -> None:
     built = write_tiles(tmp_path / "stage")
     assert write(built, tmp_path / "a") == []
     assert write(built.with_name("nvindex.usda"), tmp_path / "b") == []

@@ -1,4 +1,4 @@
-"""How a specimen opens, written into a stage and read back: cut, and with which channels."""
+"""A stage states how a specimen opens: its cut and its visible channels."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def _written(folder: Path, *, opens_cut: bool) -> Usd.Stage:
     return open_stage(folder / "stage.usda")
 
 
-def test_a_specimen_opens_cut_through_its_middle_or_whole(tmp_path: Path) -> None:
+def test_specimen_opens_whole_or_cut_through_its_middle(tmp_path: Path) -> None:
     assert opening_cut_of(_written(tmp_path / "whole", opens_cut=False)) is None
     assert opening_cut_of(_written(tmp_path / "cut", opens_cut=True)) == ((1, 0, 0), 110)
 
@@ -43,7 +43,7 @@ def test_an_edited_cut_is_taken_over_and_one_without_direction_is_refused(tmp_pa
         opening_cut_of(stage)
 
 
-def test_channels_open_shown_or_not_and_with_their_own_function(tmp_path: Path) -> None:
+def test_channels_open_visible_or_hidden_with_their_own_function(tmp_path: Path) -> None:
     skin, bone = read_appearances(_written(tmp_path, opens_cut=False))
     assert (skin.opens, skin.chosen) == (False, "default")
     assert (bone.opens, bone.chosen) == (True, "bone")
@@ -57,8 +57,8 @@ def test_one_edit_hides_a_channel_in_all_tiles_and_the_bundle_still_has_it(tmp_p
     material = stage.GetPrimAtPath(CHANNELS.AppendChild(F_ID))
     assert all(_seen(branch) for branch in branches)
     shown.MakeInvisible()
-    assert not any(_seen(branch) for branch in branches)  # what every program draws
-    assert all(is_visible(branch) for branch in branches)  # what a bundle holds
+    assert not any(_seen(branch) for branch in branches)  # other programs draw none of them
+    assert all(is_visible(branch) for branch in branches)  # a bundle has all of them
     assert not shows_at_first(material)
     UsdGeom.Imageable(branches[0]).GetVisibilityAttr().Set("invisible")
     assert [is_visible(branch) for branch in branches] == [False] + [True] * (len(branches) - 1)

@@ -1,4 +1,4 @@
-"""The rules of usd-validation-nvidia find no fault in the stages and usdz of the samples."""
+"""The rules of usd-validation-nvidia find no fault in stages and usdz files of the samples."""
 
 from pathlib import Path
 
@@ -58,7 +58,7 @@ def test_the_rules_find_no_fault_in_a_sample(tmp_path: Path, sample: str) -> Non
     assert main(["plan", *SAMPLES[sample](tmp_path), "-o", out]) == 0
     assert main(["units", out, "--workers", "0"]) == 0
     assert main(["stage", out, "--workers", "0"]) == 0
-    engine = ValidationEngine()  # all rules that are on by default, for each variant
+    engine = ValidationEngine()  # checks each variant by all default rules
     assert len(engine.initialized_rules) > 30
     for name in ("stage.usda", "display.usda", "specimen.usdz"):
         if name == "specimen.usdz":

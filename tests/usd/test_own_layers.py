@@ -1,6 +1,6 @@
-"""What a stage, or an artist's layer over it, names is read only from their own folders or below.
+"""Files that a stage or an artist's layer names are read only from their own folders or below.
 
-Each bait is a sound file, so that an exporter that opens it ends well, and the test fails.
+Each bait is a valid file. An exporter that opens it therefore succeeds, and the test fails.
 """
 
 import os
@@ -34,7 +34,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def out(made: Path, tmp_path: Path) -> Path:
-    """An OUT in a folder with an apostrophe; `other` beside it is a stranger's."""
+    """An OUT in a folder with an apostrophe; the folder `other` beside it is foreign."""
     place = tmp_path / "Ann's data" / "out"
     shutil.copytree(made, place)
     shutil.copytree(made / "stage", tmp_path / "other")
@@ -56,7 +56,7 @@ def bundle(out: Path, stage: Path | None = None) -> int:
 
 
 def name_asset(stage: Usd.Stage, kind: str, asset: str) -> None:
-    """Have a layer name a file: as its sublayer, in its prims, in a variant, in metadata."""
+    """Make a layer name a file: as its sublayer, in its prims, in a variant, or in metadata."""
     layer = stage.GetRootLayer()
     if kind == "sublayer":
         layer.subLayerPaths.append(asset)
@@ -75,7 +75,7 @@ def name_asset(stage: Usd.Stage, kind: str, asset: str) -> None:
         stage.OverridePrim(LOOK).SetCustomDataByKey("from", Sdf.AssetPath(asset))
     else:
         path, _, name = kind.rpartition(".")
-        prim = Sdf.CreatePrimInLayer(layer, path)  # which may be inactive in the variant
+        prim = Sdf.CreatePrimInLayer(layer, path)  # the prim may be inactive in the variant
         named = Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Asset)
         named.default = Sdf.AssetPath(asset)
     layer.Save()
@@ -126,7 +126,9 @@ def test_files_of_the_edit_s_own_folder_and_of_the_stage_s_are_read(out: Path) -
 
 
 @pytest.mark.slow
-def test_a_link_out_of_the_stage_is_refused(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_symbolic_link_out_of_the_stage_is_refused(
+    out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     atlas = out / "stage/tiles/r0_c0/Channel0.exr"
     bait = out.parents[1] / "other/tiles/r0_c0/Channel0.exr"
     atlas.unlink()
@@ -135,12 +137,12 @@ def test_a_link_out_of_the_stage_is_refused(out: Path, capsys: pytest.CaptureFix
     assert f"leads to {bait}, expected a file in {out}/stage" in capsys.readouterr().err
     assert main(["check", str(out)]) == 1
     told = capsys.readouterr().out
-    assert told.count(f"leads to {bait}") == 2  # of the stage, and of its files
+    assert told.count(f"leads to {bait}") == 2  # once for the stage, once for its files
     assert "Traceback" not in told
 
 
 @pytest.mark.parametrize("name", ["tiles/r0_c0/tile.usdc", "tiles/r0_c0/Channel0.exr"])
-def test_a_pipe_in_the_stage_is_refused_and_not_waited_for(
+def test_pipe_in_the_stage_is_refused_without_waiting(
     out: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     (out / "stage" / name).unlink()
@@ -165,7 +167,7 @@ def test_check_refuses_a_stage_that_leads_out(
 
 
 def test_variables_in_paths_are_refused(out: Path) -> None:
-    """A stronger layer's variables would make another path of a weaker one's."""
+    """Variables of a stronger layer could change a weaker layer's path."""
     path, over = edit_of(out, out.parents[1] / "edits")
     over.GetRootLayer().expressionVariables = {"WHERE": str(out.parents[1] / "other")}
     over.GetRootLayer().Save()
@@ -195,7 +197,8 @@ def test_the_files_of_a_stage_are_all_found(out: Path) -> None:
     files = {path.relative_to(out / "stage").as_posix() for path in _all(out)}
     assert {"stage.usda", "looks/channels.usda", "tiles/r0_c1/tile.usdc"} <= files
     written = {p.relative_to(out / "stage").as_posix() for p in (out / "stage").rglob("*.*")}
-    levels = {name for name in written if name.endswith("_level.json")}  # named, not composed
+    # Other files name these, but they are not composed.
+    levels = {name for name in written if name.endswith("_level.json")}
     assert levels
     apart = {"display.usda", "nvindex.usda", "specimen.usdz", "files.json"}
     assert files == written - apart - levels
@@ -205,7 +208,7 @@ def _all(out: Path) -> list[Path]:
     return dependencies(out / "stage" / "stage.usda", out / "stage")
 
 
-def test_an_edit_that_is_lost_fails_a_strict_bundle_and_writes_nothing(
+def test_strict_bundle_fails_and_writes_nothing_if_an_edit_is_lost(
     out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, over = edit_of(out, out.parents[1] / "edits")
@@ -222,13 +225,13 @@ def test_an_edit_that_is_lost_fails_a_strict_bundle_and_writes_nothing(
     for _ in range(2):  # the second time the bundle is up to date
         assert main(command) == 0
         assert "Channel0.inputs:colour is not taken over" in capsys.readouterr().err
-    assert main([*command, "--strict"]) == 1  # the finished bundle is no excuse
+    assert main([*command, "--strict"]) == 1  # fails although the bundle is finished
     channel.RemoveProperty("inputs:colour")
     over.GetRootLayer().Save()
     assert main([*command, "--strict"]) == 0
 
 
-def test_edits_that_are_alike_share_a_line(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_similar_edits_share_a_line(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, over = edit_of(out, out.parents[1] / "edits")
     for k in range(200):
         over.DefinePrim(f"/Specimen/Sketch/Volume{k}", "Volume")

@@ -1,4 +1,4 @@
-"""A stage has a thumbnail and cards of its surfaces; blender/test_cards.py draws the cards."""
+"""A stage has a thumbnail and cards of its surfaces. blender/test_cards.py draws the cards."""
 
 from dataclasses import replace
 from pathlib import Path

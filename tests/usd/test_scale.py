@@ -1,6 +1,6 @@
 """A stage of 22 x 11 tiles and 70 channels, 16 940 units, opens with its payloads unloaded.
 
-One tile is written; the others are copies of its layer. What is unloaded isn't read.
+One tile is written; the others are copies of its layer. Unloaded tiles are not read.
 """
 
 from typing import Any
@@ -10,7 +10,7 @@ import pytest
 from support.many_tiles import CHANNELS, COLUMNS, EDGE, ROWS, open_unloaded, write_many
 
 OPENS_S = 10.0
-GROWTH_MIB = 300  # of the memory of a process that opens it
+GROWTH_MIB = 300  # growth of a process's memory when it opens the stage
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def colors_of(mesh: Usd.Prim) -> tuple[Gf.Vec3f, Gf.Vec3f]:
-    """Return the colours of a mesh's material, in every renderer, and of the mesh itself."""
+    """Return the colours of a mesh's material in each renderer, and of the mesh itself."""
     material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
     shader, _, _ = material.ComputeSurfaceSource()
     assert shader.GetShaderId() == "UsdPreviewSurface"
@@ -52,7 +52,7 @@ def test_the_colour_of_the_stage_is_stronger_than_that_of_the_tile(
     stage = Usd.Stage.Open(str(path))
     for tile in TILES:
         assert colors_of(stage.GetPrimAtPath(leaf(tile, F_ID)))[0] == green
-    # A flattened copy has the edited colour on the meshes themselves, too.
+    # In a flattened copy, the meshes themselves also have the edited colour.
     flat = tmp_path / "flat.usdc"
     export_stage(path, flat, options=ExportOptions(lod=1))
     flattened = Usd.Stage.Open(str(flat))

@@ -1,4 +1,4 @@
-"""Values of another type than the stage's, or that are no finite numbers, in a layer over it."""
+"""A layer over the stage may have values of a wrong type, or values that are not finite."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -33,7 +33,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def edited(stage_path: Path, tmp_path: Path) -> Callable[[str, str], Path]:
-    """A function that writes a layer over the stage with one line at a prim."""
+    """Return a function that writes a layer over the stage with one line at a prim."""
 
     def write(prim: str, line: str) -> Path:
         body = line
@@ -194,7 +194,7 @@ def test_an_error_of_usd_is_one_line_of_a_command(
     assert "\n" not in line
 
 
-def test_a_value_may_be_nan_where_that_means_none() -> None:
+def test_value_may_be_nan_where_nan_means_none() -> None:
     stage = Usd.Stage.CreateInMemory()
     attribute = stage.DefinePrim("/P").CreateAttribute("a", Sdf.ValueTypeNames.FloatArray)
     attribute.Set([1.0, float("nan")])

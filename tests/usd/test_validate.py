@@ -48,7 +48,7 @@ def test_an_unknown_variant_is_found(stage_path: Path, tmp_path: Path) -> None:
     assert any("variant set lod selects 'lod9'" in text for text in findings)
 
 
-def test_a_window_that_falls_is_found(stage_path: Path, tmp_path: Path) -> None:
+def test_window_with_reversed_bounds_is_found(stage_path: Path, tmp_path: Path) -> None:
     path = tmp_path / "edit.usda"
     window = f'over "{F_ID}"\n{{\nfloat2 stereocell:window = (9, 2)\n}}'
     body = f'over "Specimen"\n{{\nover "Channels"\n{{\n{window}\n}}\n}}\n'
@@ -104,7 +104,7 @@ def test_faults_of_unselected_levels_and_missing_files_are_found(tmp_path: Path)
         assert any(str(name) in text for text in findings)
 
 
-def test_what_is_no_stage_is_one_finding(tmp_path: Path) -> None:
+def test_file_that_is_not_a_stage_is_one_finding(tmp_path: Path) -> None:
     (tmp_path / "stage.usda").write_text("#usda 1.0\nnonsense")
     for path in (tmp_path / "stage.usda", tmp_path / "missing.usda"):
         (finding,) = validate_stage(path)
@@ -129,7 +129,7 @@ def test_every_combination_of_variants_composes(stage_path: Path) -> None:
         for tile in TILES:
             shown = {"Mesh": f"{F_ID}_{tile}", "Volume": f"{F_ID}_{tile}_volume"}
             for kind, name in shown.items():
-                # what is not shown is inactive: not there for a client that asks
+                # A hidden representation is inactive, so programs don't find it.
                 expected = representation in ("both", kind.lower())
                 assert (drawn.get(name) == kind) == expected
         assert np.allclose(

@@ -53,6 +53,6 @@ def test_the_layer_gives_all_tiles_a_volume_of_the_channels_colour(over: Path) -
 
 
 def test_usds_validators_without_materialx_refuse_it(over: Path) -> None:
-    """Why the stage does not have it: once this fails, it could."""
+    """The stage has no such material for this reason. Once this test fails, it could have one."""
     rules = {finding.rule for finding in validate_stage(over)}
     assert rules == {"usdShadeValidators:ShaderSdrCompliance.MissingShaderIdInRegistry"}

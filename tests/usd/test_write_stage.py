@@ -35,7 +35,7 @@ from support.stages import (
 )
 from support.vdb_reader import read_vdb, value_at
 
-# voxels (z, y, x) at a corner of the F and just outside of it: one corner in each tile
+# Voxels (z, y, x) at a corner of the F and just outside of it; one corner in each tile
 BORDER = [
     (4, 6, 6),
     (3, 6, 6),
@@ -55,7 +55,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def over(stage_path: Path, tmp_path: Path) -> Usd.Stage:
-    """A layer of an artist's over the stage, in another folder."""
+    """An artist's layer over the stage, in another folder."""
     path = tmp_path / "edit.usda"
     path.write_text(f"{HEAD}subLayers = [@{stage_path}@])\n")
     return Usd.Stage.Open(str(path))
@@ -69,7 +69,7 @@ def select(stage: Usd.Stage, **variants: str) -> None:
 
 
 def points_of(stage: Usd.Stage, channel: str) -> np.ndarray:
-    """World positions of a channel's vertices in all tiles."""
+    """Return the world positions of a channel's vertices in all tiles."""
     parts = []
     for tile in TILES:
         mesh = UsdGeom.Mesh.Get(stage, leaf(tile, channel))
@@ -80,7 +80,7 @@ def points_of(stage: Usd.Stage, channel: str) -> np.ndarray:
 
 
 def surface_color(stage: Usd.Stage, tile: str, channel: str) -> Gf.Vec3f:
-    """Return the colour that Storm finds from the mesh: by its binding, then by the connection."""
+    """Return the colour that Storm draws, which it finds by the binding and then the connection."""
     mesh = stage.GetPrimAtPath(leaf(tile, channel))
     material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
     shader = material.ComputeSurfaceSource("glslfx")[0]
@@ -99,7 +99,7 @@ def test_the_stage_has_its_prims_kinds_and_units(stage_path: Path) -> None:
     tiles = stage.GetPrimAtPath("/Specimen/Tiles").GetChildren()
     assert [tile.GetName() for tile in tiles] == list(TILES)
     for tile in tiles:
-        assert tile.IsModel()  # the kinds above it are groups without a gap
+        assert tile.IsModel()  # true only if all prims above it are groups
         assert Usd.ModelAPI(tile).GetKind() == Kind.Tokens.component
         assert tile.HasAuthoredPayloads()
     data = stage.GetRootLayer().customLayerData["stereocell"]
@@ -114,14 +114,14 @@ def test_the_root_states_what_the_asset_is(stage_path: Path, tmp_path: Path) -> 
     assert model.GetAssetName() == "F"
     assert model.GetAssetIdentifier().path == "./stage.usda"
     assert "9 x 12 x 8 um" in root.GetDocumentation()
-    # the box of all tiles, which are not loaded
+    # The box of all tiles, although they are not loaded.
     low, high = np.array(UsdGeom.ModelAPI(root).GetExtentsHint())
     depth, height, width = SPACING_UM
     slices, rows, columns = SHAPE
     half = np.array([width, height, depth]) / 2
     assert low == pytest.approx(np.array([0, -(rows - 1) * height, 0]) - half)
     assert high == pytest.approx(np.array([(columns - 1) * width, 0, (slices - 1) * depth]) + half)
-    # another build of other settings is another version
+    # A build with other settings is another version.
     other = tmp_path / "other/stage.usda"
     tiles = [TileExtent.of(tile) for tile in make_tiles()]
     changed = {"generator": "tests", "seed": 2}
@@ -141,7 +141,7 @@ def test_every_name_in_the_files_is_relative(stage_path: Path) -> None:
 
 
 @pytest.mark.parametrize("lod", ["lod0", "lod1", "lod2"])
-def test_the_letter_is_not_mirrored_and_stands_upright(over: Usd.Stage, lod: str) -> None:
+def test_letter_is_upright_and_not_mirrored(over: Usd.Stage, lod: str) -> None:
     select(over, lod=lod)
     points = points_of(over, F_ID)
     depth, height, width = SPACING_UM
@@ -178,7 +178,7 @@ def test_volume_and_mesh_show_the_same_body(over: Usd.Stage) -> None:
                 low, high = np.array(volume.GetExtentAttr().Get())
                 assert (low < position).all()
                 assert (position < high).all()
-    assert found == body.sum()  # own voxels only: none twice, none lost
+    assert found == body.sum()  # only own voxels count, so none is missing or counted twice
 
 
 def test_the_atlas_is_the_volume_with_its_apron(over: Usd.Stage) -> None:
@@ -209,7 +209,7 @@ def test_representations_switch_meshes_and_volumes(over: Usd.Stage) -> None:
     assert over.GetPrimAtPath(leaf("r0_c0", EMPTY_ID, "_volume"))
 
 
-def test_selections_stand_in_the_layer_of_the_contents(stage_path: Path) -> None:
+def test_variant_selections_are_in_the_layer_of_the_contents(stage_path: Path) -> None:
     root = Sdf.Layer.FindOrOpen(str(stage_path.parent / "contents.usda"))
     for tile in TILES:
         selections = root.GetPrimAtPath(f"/Specimen/Tiles/{tile}").variantSelections
@@ -231,7 +231,7 @@ def test_lods_differ_and_state_their_distance(over: Usd.Stage) -> None:
         has_uvs = UsdGeom.PrimvarsAPI(mesh).HasPrimvar("st")
         material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
         normal = material.ComputeSurfaceSource()[0].GetInput("normal")
-        live = material.ComputeSurfaceSource("glslfx")[0].GetInput("normal")  # of Storm
+        live = material.ComputeSurfaceSource("glslfx")[0].GetInput("normal")  # input for Storm
         assert has_uvs == bool(normal) == bool(live) == (lod == "lod2")
     assert distances == pytest.approx([0.0, 0.1, 0.3])
     assert counts[2] < counts[0]
@@ -240,7 +240,7 @@ def test_lods_differ_and_state_their_distance(over: Usd.Stage) -> None:
     assert Path(file.resolvedPath).name == f"{F_ID}_lod2_normal.png"
 
 
-def test_one_opinion_over_the_stage_recolours_every_tile(over: Usd.Stage) -> None:
+def test_one_edit_over_the_stage_recolours_every_tile(over: Usd.Stage) -> None:
     for tile in TILES:
         assert surface_color(over, tile, F_ID) == Gf.Vec3f(*COLORS[0])
     channel = over.OverridePrim(f"/Specimen/Channels/{F_ID}")
@@ -249,7 +249,7 @@ def test_one_opinion_over_the_stage_recolours_every_tile(over: Usd.Stage) -> Non
         assert surface_color(over, tile, F_ID) == Gf.Vec3f(0, 1, 0.5)
         assert surface_color(over, tile, BALL_ID) == Gf.Vec3f(*COLORS[1])
         look = UsdShade.Material.Get(over, leaf(tile, F_ID, "_look"))
-        assert look.GetInput("color").Get() == Gf.Vec3f(0, 1, 0.5)  # what volumes read
+        assert look.GetInput("color").Get() == Gf.Vec3f(0, 1, 0.5)  # volumes read this input
 
 
 def test_a_transfer_function_is_chosen_in_one_place(over: Usd.Stage) -> None:
@@ -296,7 +296,7 @@ def test_cameras_see_the_whole_specimen(stage_path: Path) -> None:
         assert frustum.ComputeViewDirection() == Gf.Vec3d(0, 0, -1)
         to_screen = frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix()
         centres.append(to_screen.Transform(middle)[:2])
-        # the picture is filled, not a speck in its middle
+        # The specimen fills the picture.
         across = [to_screen.Transform(corner)[:2] for corner in corners]
         assert np.abs(across).max() > 0.8
     assert np.allclose(centres, 0, atol=1e-6)  # both eyes see it at the same place
@@ -321,22 +321,22 @@ def test_unloaded_tiles_still_have_their_bounds(stage_path: Path) -> None:
 def test_another_process_writes_the_same_bytes(stage_path: Path, tmp_path: Path) -> None:
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         pool.apply(write_whole, (tmp_path / "again",))
-        assert pool.apply(has_schema)  # that process opened no stage before the import
+        assert pool.apply(has_schema)  # the schema is registered before any stage is opened
     written = digests_of(stage_path.parent)
     assert written == digests_of(tmp_path / "again")
     assert not [name for name in written if "/." in name or name.startswith(".")]
 
 
-def test_the_generated_schema_is_what_usd_makes_of_its_source(
+def test_generated_schema_is_usds_output_for_its_source(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     folder = assets.find_asset("schemas/usd")
     monkeypatch.chdir(folder)
     monkeypatch.setattr(sys, "argv", ["usdGenSchema", "schema.usda", str(tmp_path)])
-    # it sets this for good, and whoever inherits it knows no schemas
+    # usdGenSchema sets this variable, which would hide schemas from later processes.
     monkeypatch.setenv("USD_DISABLE_PRIM_DEFINITIONS_FOR_USDGENSCHEMA", "true")
     runpy.run_module("pxr.Usd.usdGenSchema", run_name="__main__")
-    capfd.readouterr()  # it reports what it wrote
+    capfd.readouterr()  # discards its report
     made = (tmp_path / "generatedSchema.usda").read_text("utf-8")
     assert made == (folder / "generatedSchema.usda").read_text("utf-8")
 

@@ -1,4 +1,4 @@
-"""specimen.usdz: small, on the floor, right in colour, and fit for the validators of usdz."""
+"""specimen.usdz is small, stands on the floor, has the right colours, and is valid."""
 
 import hashlib
 import multiprocessing
@@ -45,18 +45,18 @@ def test_the_validators_of_usdz_find_nothing(small: Path) -> None:
     assert validate_usdz(small) == []
 
 
-def test_it_is_as_large_as_a_hand_and_stands_on_the_floor(small: Path) -> None:
+def test_specimen_is_as_large_as_a_hand_and_stands_on_the_floor(small: Path) -> None:
     stage = Usd.Stage.Open(str(small))
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1
     points = [np.array(mesh.GetPointsAttr().Get()) for mesh in meshes(stage).values()]
     low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
-    # the longest edge of the tiles' boxes, half a voxel wider on both sides than the voxel centres
+    # Longest edge of the tiles' boxes, which extend half a voxel beyond the voxel centres.
     longest_um = max(n * h for n, h in zip(SHAPE, SPACING_UM, strict=True))
     scale = 0.15 / (longest_um * 1e-6)
     stated = stage.GetRootLayer().customLayerData["stereocell"]
     assert stated["scale"] == pytest.approx(scale)
     assert (stated["size"], stated["lod"]) == (0.15, 0)
-    # the F itself: 24 x 36 of the voxels, upright
+    # The F itself is upright and has 24 x 36 voxels.
     assert high[1] - low[1] == pytest.approx(36 * 0.25e-6 * scale, rel=0.03)
     assert low[1] > 0
     assert (np.abs([low[[0, 2]], high[[0, 2]]]) < 0.075).all()
@@ -81,16 +81,16 @@ def test_each_channel_has_its_colour_also_after_an_edit(
     assert color_of(drawn[f"{F_ID}_r0_c1"]) == Gf.Vec3f(0, 0, 1)
 
 
-def test_a_heavy_specimen_is_shown_at_a_coarser_level(
+def test_large_specimen_is_written_at_a_coarser_level(
     stage_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "specimen.usdz"
     monkeypatch.setattr(usdz_writer, "MAX_TRIANGLES", 1)
-    assert write_usdz(stage_path, path) == 2  # none is light enough: the coarsest
+    assert write_usdz(stage_path, path) == 2  # no level is small enough, so the coarsest is written
     assert validate_usdz(path) == []
     names = zipfile.ZipFile(path).namelist()
     assert names[0] == "specimen.usdc"
-    # the coarse level has normal maps, one for each mesh
+    # The coarse level has one normal map for each mesh.
     maps = [f"textures/{c}_{t}_normal.png" for c in (F_ID, BALL_ID) for t in ("r0_c0", "r0_c1")]
     assert sorted(names[1:]) == sorted([*maps, "textures/dome.png"])
     stage = Usd.Stage.Open(str(path))
@@ -102,7 +102,7 @@ def test_a_heavy_specimen_is_shown_at_a_coarser_level(
 
 
 def with_one_shown(stage_path: Path, edit: Path, channel: str) -> Usd.Stage:
-    """Open a layer over the stage that shows one channel alone."""
+    """Open a layer over the stage that shows only one channel."""
     edit.write_text(f"{HEAD}subLayers = [@{stage_path}@])\n")
     stage = Usd.Stage.Open(str(edit))
     for prim in stage.GetPrimAtPath(SHOWN).GetChildren():
@@ -111,7 +111,7 @@ def with_one_shown(stage_path: Path, edit: Path, channel: str) -> Usd.Stage:
     return stage
 
 
-def test_channels_that_show_are_alone_in_it_unless_their_surfaces_are_hidden(
+def test_usdz_has_only_visible_channels_unless_their_surfaces_are_hidden(
     stage_path: Path, tmp_path: Path
 ) -> None:
     edit = tmp_path / "edit.usda"
@@ -134,7 +134,7 @@ def test_channels_that_show_are_alone_in_it_unless_their_surfaces_are_hidden(
     assert shown() == every - balls
 
 
-def test_channels_that_do_not_show_weigh_nothing(
+def test_hidden_channels_do_not_count_for_the_size(
     stage_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     edit, path = tmp_path / "edit.usda", tmp_path / "edit.usdz"
@@ -165,7 +165,7 @@ def test_faults_of_a_usdz_are_found(stage_path: Path, small: Path, tmp_path: Pat
     text = " ".join(str(finding) for finding in validate_usdz(packed))
     assert "metersPerUnit 0.01 and upAxis Y, expected 1.0 and Y" in text
     assert "no client of usdz draws volumes" in text
-    assert "usdUtilsValidators" in text  # bytes that start anywhere: USD finds it
+    assert "usdUtilsValidators" in text  # USD finds the file whose bytes are not aligned
 
 
 @pytest.mark.slow

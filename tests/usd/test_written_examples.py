@@ -1,4 +1,4 @@
-"""The layers of README and docs state the units and the root of the stage they are put over."""
+"""Layers in README and docs state the units and the root prim of the stage below them."""
 
 import re
 from pathlib import Path
@@ -41,7 +41,8 @@ def test_a_layer_of_the_docs_composes_over_a_stage_with_its_units(
     over = Usd.Stage.Open(layer)
     assert UsdGeom.GetStageMetersPerUnit(over) == 1e-6
     assert UsdGeom.GetStageUpAxis(over) == "Y"
-    assert "metersPerUnit = 0.000001\n" in text  # for programs that read no exponents
+    # Some programs can\'t read exponents.
+    assert "metersPerUnit = 0.000001\n" in text
     assert over.GetDefaultPrim().IsValid()
     changed = [spec.path for spec in layer.rootPrims["Specimen"].nameChildren]
     assert changed

@@ -1,15 +1,17 @@
-"""What `make bench-viewer` prints: our march against those that a user would pick instead.
+"""Print the tables of `make bench-viewer`: our ray march beside other renderers for the web.
 
-The same volume, transfer function, camera and 512 x 512 picture in one headless Chromium: vtk.js,
-NiiVue, three's own example and ours, ROUNDS rounds of each in turn. Given are the median time, and
-the median of the rounds' ratios to ours. Software draws it unless STEREOCELL_GPU_FLAGS holds
-Chromium's flags for a GPU: only ratios mean anything. PSNR is against the float64 reference, of the
-whole picture, of the pixels where the reference shows something, and there of the opacity that a
-picture shows: ours adds light, where a little opacity is ten times as much of 8 bits as where
-encoded colours are blended, as peers do it. The pictures stay in OUT.
+vtk.js, NiiVue, three's own example and ours draw the same volume with the same transfer function,
+camera and size (512 x 512) in one headless Chromium, alternately, for ROUNDS rounds. The table has
+the median time, and the median of the rounds' ratios to ours. Software draws unless
+STEREOCELL_GPU_FLAGS holds Chromium's flags for a GPU, so only ratios are meaningful.
 
-Light is off where peers are compared: each has its own. No peer lets its settings be matched more
-closely than scene.py and src/*.ts say.
+PSNR compares pictures with the float64 reference in three ways: over the whole picture, over the
+pixels where the reference shows something, and there by opacity alone. Ours adds light, so a small
+opacity changes 8-bit values ten times as much as in other renderers, which blend encoded colours.
+The pictures stay in OUT.
+
+Light is off in comparisons, because each renderer has its own. scene.py and src/*.ts state how
+closely the settings of other renderers can be matched.
 """
 
 import json
@@ -34,12 +36,13 @@ from support.reference_raymarch import decoded, encode, encoded, path_voxels, ps
 
 HERE = Path(__file__).parent
 ROUNDS = int(os.environ.get("ROUNDS", "15"))
-RIVALS = {"parallel": "narrow"}  # the camera of ours that a peer's is compared with
+# Another renderer's camera: the camera of ours to compare with
+RIVALS = {"parallel": "narrow"}
 HEAD = (
     ("scene", "camera", "ms", "of ours", "samples", "PSNR", "where", "of its"),
     ("", "", "", "", "a ray", "dB", "drawn", "opacity"),
 )
-NIIVUE_OPAQUE = 0.95  # its rays end here, and are scaled to 1
+NIIVUE_OPAQUE = 0.95  # opacity at which its rays end; it is then scaled to 1
 
 
 @dataclass(frozen=True)
@@ -49,13 +52,13 @@ class Run:
     scene: str
     camera: str
     setting: float
-    says: str  # in the table
-    voxels: float | None  # a step's length, where the renderer doesn't count its steps
+    says: str  # name of the row in the table
+    voxels: float | None  # step length, if the renderer doesn't count its steps
     shading: bool = False
 
 
 class Timing(TypedDict):
-    """What run.ts measured of a run."""
+    """The measures of a run by run.ts."""
 
     name: str
     ms: list[float]
@@ -63,7 +66,7 @@ class Timing(TypedDict):
 
 
 def runs_on(scene: str) -> list[Run]:
-    """Return what is timed on a scene."""
+    """Return the runs on a scene."""
 
     def run(renderer: str, camera: str, setting: float, says: str, step: float | None) -> Run:
         name = f"{scene}-{renderer}-{camera}-{setting:g}"
@@ -80,14 +83,14 @@ def runs_on(scene: str) -> list[Run]:
 
 
 def lit(scene: str) -> Run:
-    """Return the run of ours as the viewer shows it."""
+    """Return the run of our renderer with the viewer's light."""
     return Run(
         f"{scene}-ours-lit", "ours", scene, "perspective", 1, "ours, with its light", None, True
     )
 
 
 def runs_on_head(scene: str) -> list[Run]:
-    """Return what is timed on the real MRI: whole voxels a step, and one sample of each pixel."""
+    """Return the runs on the real MRI: steps of a whole voxel, and one sample per pixel."""
     given = [
         ("vtk", "perspective", 1, "vtk.js, step 1"),
         ("three", "perspective", 1, "three's example, step 1"),
@@ -105,7 +108,7 @@ def runs_on_head(scene: str) -> list[Run]:
 
 
 def head_row(run: Run, timings: dict[str, Timing], folder: Path) -> str:
-    """Return a run's line of the second table: time alone, as no two draw the same light."""
+    """Return a run's line of the second table: time only, because renderers differ in light."""
     Image.fromarray(picture_of(run, folder)).save(folder / f"{run.name}.png")
     ms = timings[run.name]["ms"]
     rival = timings[f"{run.scene}-ours-{RIVALS.get(run.camera, run.camera)}-0"]["ms"]
@@ -115,7 +118,7 @@ def head_row(run: Run, timings: dict[str, Timing], folder: Path) -> str:
 
 
 def missing() -> str | None:
-    """Return why nothing can be measured here."""
+    """Return the reason why the bench can't run on this machine, or None."""
     if shutil.which("node") is None:
         return "no node"
     chromium = os.environ.get("CHROMIUM") or "/usr/bin/chromium"
@@ -123,14 +126,14 @@ def missing() -> str | None:
 
 
 def picture_of(run: Run, folder: Path) -> NDArray[np.uint8]:
-    """Return what a run drew, (height, width, 3), top row first."""
+    """Return a run's picture (height, width, 3), top row first."""
     width, height = SIZE_PX
     rgba = np.frombuffer((folder / f"{run.name}.rgba").read_bytes(), np.uint8)
     return rgba.reshape(height, width, 4)[::-1, :, :3]
 
 
 def unblended(picture: NDArray[np.uint8], color: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return NiiVue's picture as it was before its opacity was multiplied in twice."""
+    """Return NiiVue's picture with opacity multiplied in once instead of twice."""
     share = np.sqrt(NIIVUE_OPAQUE * picture / color)
     pixels: NDArray[np.uint8] = np.rint(color * np.clip(share, 0, 1)).astype(np.uint8)
     return pixels
@@ -143,7 +146,7 @@ def psnr_of_opacity(
     *,
     adds_light: bool,
 ) -> str:
-    """Return in dB how near the opacity is that a picture of one colour shows, where any is."""
+    """Return the PSNR, dB, of a one-colour picture's opacity where the reference is not empty."""
     k = int(np.argmax(color))
     level = picture[..., k] / 255
     shown = decoded(level) / color[k] if adds_light else level / encoded(color)[k]
@@ -157,7 +160,7 @@ def row(run: Run, scene: Scene, timings: dict[str, Timing], folder: Path) -> str
     ideal = reference(scene, run.camera, run.shading, folder)
     there = ideal[..., 3] > 0
     Image.fromarray(picture_of(run, folder)).save(folder / f"{run.name}.png")
-    is_ours = run.renderer == "ours"  # the others' pages blend what is encoded
+    is_ours = run.renderer == "ours"  # other renderers blend encoded colours
     expected, found = encode(ideal, adds_light=is_ours), picture_of(run, folder)
     ms, steps = statistics.median(timing["ms"]), timing["steps"]
     path = path_voxels(scene.block, scene.cameras[run.camera])

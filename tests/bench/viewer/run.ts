@@ -1,8 +1,8 @@
 /**
  * Time every renderer in one headless Chromium, in rounds: node run.ts JOB OUT.
  *
- * JOB is a JSON file, see `Job`. A run's picture goes to OUT/NAME.rgba (bottom row first), what was
- * measured to OUT/timings.json. Each run has a page of its own that stays open; only one draws.
+ * JOB is a JSON file, see `Job`. A run's picture goes to OUT/NAME.rgba (bottom row first), its
+ * times to OUT/timings.json. Each run has a page of its own that stays open; one draws at a time.
  */
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -21,7 +21,7 @@ type Job = Readonly<{ rounds: number; runs: readonly Run[] }>;
 type Timing = { name: string; ms: number[]; steps: number | null };
 
 const HERE = new URL(".", import.meta.url).pathname;
-/** Another checkout of the viewer may be measured. */
+/** The measured viewer; it may be that of another checkout. */
 const VIEWER = process.env.STEREOCELL_VIEWER || join(HERE, "../../../viewer_gltf");
 const ORIGIN = "http://bench.localhost/";
 const SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
@@ -44,7 +44,7 @@ async function bundled(renderer: string): Promise<string> {
     define: { "process.env.NODE_ENV": '"production"', global: "globalThis" },
     resolve: {
       alias: { viewer: join(VIEWER, "src") },
-      dedupe: ["three"], // the viewer's sources would bring their own
+      dedupe: ["three"], // otherwise the viewer's sources load a second copy
     },
     build: {
       write: false,
@@ -102,7 +102,7 @@ async function main([jobFile, out]: readonly string[]): Promise<void> {
   const profile = await mkdtemp(join(tmpdir(), "stereocell-bench-"));
   const context = await chromium.launchPersistentContext(profile, {
     executablePath: process.env.CHROMIUM || "/usr/bin/chromium",
-    headless: false, // playwright's own switch is the old mode
+    headless: false, // playwright's own switch starts the old headless mode
     args: [...FLAGS, ...(process.env.STEREOCELL_GPU_FLAGS?.split(" ") ?? SOFTWARE)],
     viewport: { width: 600, height: 600 },
     deviceScaleFactor: 1,

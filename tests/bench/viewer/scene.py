@@ -1,12 +1,12 @@
-"""What the renderers of the bench draw: volumes, their transfer functions and three cameras.
+"""Make the scenes of the renderers' bench: volumes, their transfer functions and three cameras.
 
-The volume is of the sample generator's nuclei, two voxels by two of the plane averaged, which
-makes voxels cubes: NiiVue's opacity is by voxels passed, whatever their lengths. Its outermost two
-voxels on every side are empty, because each renderer ends a volume elsewhere: at the outermost
-voxels' centres, at their faces, or an apron before.
+The volume has the sample generator's nuclei, averaged over 2 x 2 voxels in the plane. This makes
+voxels cubes, because NiiVue's opacity depends on the number of voxels along a ray, not on their
+size. The outermost two voxels on every side are empty, because renderers end a volume at different
+places: at the outermost voxels' centres, at their faces, or an apron before.
 
-Ours has no parallel projection, and NiiVue no other: they are compared by a camera as far away as
-a field of view of NARROW_DEG puts it, each against the reference of its own camera.
+Our renderer has no parallel projection, and NiiVue has no other. So ours uses a distant camera with
+a field of view of NARROW_DEG. Each is compared with the reference of its own camera.
 """
 
 import hashlib
@@ -29,12 +29,12 @@ from support import reference_raymarch
 from support.reference_raymarch import Block, Camera, Values, render
 
 SHAPE = (97, 256, 256)
-SPACING = SPACING_UM[0]  # um, of the cubes
+SPACING = SPACING_UM[0]  # um, edge of the cubes
 BORDER = 2
-WINDOW = (0.5, 0.998)  # shares of the voxels below 0 and 1
-ISO = 0.4  # of the window: half-way up the nuclei's flanks
-HEAD_ISO = 0.2  # of the window: between air and skin
-COLOR = (0.25, 0.55, 1.0)  # linear
+WINDOW = (0.5, 0.998)  # quantiles of the voxels that become 0 and 1
+ISO = 0.4  # share of the window, half-way up the nuclei's flanks
+HEAD_ISO = 0.2  # share of the window, between air and skin
+COLOR = (0.25, 0.55, 1.0)  # linear RGB
 SIZE_PX = (512, 512)
 FOV_DEG = 30.0
 NARROW_DEG = 5.0
@@ -78,12 +78,12 @@ class Scene:
 def scene_of(
     name: str, voxels: NDArray[np.uint8], spacing_um: Values, iso: float, function: str
 ) -> Scene:
-    """Return a scene of voxels (z, y, x) whose outermost are the apron; spacing (x, y, z)."""
+    """Return a scene of voxels (z, y, x), whose outermost voxels are the apron."""
     histogram = np.histogram(voxels, 256, (0, 256))[0]
     points = np.array(make_transfer_functions(histogram, iso)[function])
     table = np.ones((1, 256, 4))
     opacity = np.interp(np.arange(256) / 255, points[:, 0], points[:, 1])
-    table[0, :, 3] = np.rint(255 * opacity) / 255  # as the bundle's table holds it
+    table[0, :, 3] = np.rint(255 * opacity) / 255  # rounded as in the bundle's table
     nx, ny, nz = (n * float(h) for n, h in zip(voxels.shape[::-1], spacing_um, strict=True))
     x, y, z = (float(h) for h in spacing_um)
     low, high = (x, 2 * y - ny, z), (nx - 2 * x, -y, nz - 2 * z)
@@ -92,7 +92,7 @@ def scene_of(
 
 
 def cameras_on(target_um: Values, scale: float) -> dict[str, Camera]:
-    """Return the cameras by name; they show the same of what is at the target."""
+    """Return the cameras by name; all show the target at the same size."""
     x, y, z = (float(v) for v in target_um)
     towards = np.array(TOWARDS_EYE) / np.linalg.norm(TOWARDS_EYE)
     half = scale * DISTANCE_UM * np.tan(np.deg2rad(FOV_DEG) / 2)
@@ -107,7 +107,7 @@ def cameras_on(target_um: Values, scale: float) -> dict[str, Camera]:
 
 
 def nuclei() -> tuple[Scene, Scene]:
-    """Return the scenes that all renderers are timed on: translucent, and nearly surfaces."""
+    """Return the two scenes of all renderers: a translucent one, and one close to surfaces."""
     depth, height, width = SHAPE
     fine = (depth, 2 * height, 2 * width)
     z, y, x = (n * h for n, h in zip(fine, SPACING_UM, strict=True))
@@ -122,7 +122,7 @@ def nuclei() -> tuple[Scene, Scene]:
 
 
 def brain_cells() -> Scene:
-    """Return a real tile, of the embedded light-sheet stack: its voxels aren't cubes."""
+    """Return a real tile of the embedded light-sheet stack, whose voxels aren't cubes."""
     file = resources.files("stereocell.samples") / "brain-cells" / "brain_cells.ome.tif"
     source = read.open(str(file))
     depth, height, width = (min(a, b) for a, b in zip(source.levels[0].shape, SHAPE, strict=True))
@@ -133,9 +133,9 @@ def brain_cells() -> Scene:
 
 
 def head() -> tuple[Scene, ...]:
-    """Return the real MRI of STEREOCELL_DATA, two voxels by two by two averaged; none without.
+    """Return the real MRI of STEREOCELL_DATA, averaged over 2 x 2 x 2 voxels, or None without it.
 
-    Its voxels are taken for cubes (.667, .667, .7 mm), as NiiVue wants them.
+    Its voxels (.667, .667, .7 mm) are treated as cubes, which NiiVue needs.
     """
     folder = Path(os.environ.get("STEREOCELL_DATA", "")) / "mri_t1_7t" / "dicoms"
     if not folder.is_dir():
@@ -164,7 +164,7 @@ def windowed(values: Values) -> NDArray[np.uint8]:
 
 
 def reference(scene: Scene, camera: str, shading: bool, cache: Path) -> Values:
-    """Return what `render` makes of a scene; it is kept in `cache` and made once."""
+    """Return the picture of a scene by `render`; it is made once and kept in `cache`."""
     block = scene.block
     key = hashlib.sha256(Path(reference_raymarch.__file__).read_bytes())
     for part in (*block.channels, block.tables, block.colors):

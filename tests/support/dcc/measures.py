@@ -37,7 +37,7 @@ class Measures:
     luminance   mean over the specimen, of the encoded values, 0 to 1
     white       share of the specimen's pixels that are white in all three colours
     hues        degrees between a channel's hue and that of its pixels, by channel
-    silhouette  intersection over union with that of the truth; 1 where nothing says it
+    silhouette  intersection over union with the truth's silhouette; 1 if there is no truth
     """
 
     luminance: float
@@ -81,11 +81,11 @@ def measure(
 
 
 def overlap(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
-    """Return the intersection over the union of two silhouettes, but for their outermost pixels.
+    """Return the intersection over union of two silhouettes, with a tolerance of one pixel.
 
-    A pixel on an edge is covered in part, and programs differ in what they make of it: cells of a
-    few pixels have hardly any others. So a pixel differs only if none of the eight around it is
-    covered in the other picture.
+    A pixel on an edge is covered in part, and programs draw it differently. Cells that are a few
+    pixels wide consist almost only of edges. So a pixel counts as different only if none of its
+    eight neighbours is covered in the other picture.
     """
     around = np.ones((3, 3), bool)
     wide_one, wide_other = (ndimage.binary_dilation(part, around) for part in (one, other))

@@ -1,4 +1,4 @@
-"""The pictures of one sample, a program and a file each, and what is measured of them."""
+"""Draw one sample in each program from each file, and measure the pictures."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ UNITS = {"stage": 1e-6, "flat": 1e-6, "usdz": 1.0}  # metres in a unit of each U
 VOLUMES = "add-on, volumes"
 # Seen from the front a .glb is in the shade of Blender's default lamp, which stands behind it
 BY_DEFAULT_CAMERA = "Blender's view, glb"
-# The renderer in which Blender shows an import without volumes
+# Blender's renderer for an import without volumes
 EEVEE = "add-on, EEVEE"
 COLUMNS = {
     "Storm, stage": ("storm", "stage"),
@@ -46,7 +46,7 @@ COLUMNS = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture, and what was measured of it; `drawn` is its silhouette."""
+    """A picture and its measures; `drawn` is its silhouette."""
 
     file: Path
     drawn: NDArray[np.bool_]
@@ -66,7 +66,7 @@ def draw_pictures(
 ) -> dict[str, Picture]:
     """Draw a stage and what is exported of it in each program; return the pictures by column."""
     files = export_files(stage_path, folder)
-    small = (size[0] // 2, size[1] // 2)  # of volumes, which take longest
+    small = (size[0] // 2, size[1] // 2)  # for volumes, which take longest to draw
     _draw(files, folder, columns, (size, small))
     stage, view = Usd.Stage.Open(str(stage_path)), files.views["stage"]
     truth, small_truth = (find_truth(stage, view, pixels) for pixels in (size, small))
@@ -110,7 +110,7 @@ def _draw(
                 continue
             by_blender.append({**job, "by": program})
         else:
-            # a .glb has no lights, a .usdz its own but for the image of the dome
+            # A .glb has no lights. A .usdz has its own lights, except the image of the dome.
             suns = lights["suns"] if kind == "glb" else []
             for_the_web.append({**job, "program": program, "lights": {**lights, "suns": suns}})
     draw_by_blender(by_blender, folder)

@@ -59,7 +59,7 @@ def draw_by_storm(file: Path, view: View, unit: float, picture: Path, width: int
 
 
 def draw_for_the_web(jobs: list[dict[str, object]], folder: Path) -> None:
-    """Draw files by three.js and Cesium; each job as the viewer's scripts/draw_models.ts has it."""
+    """Draw files by three.js and Cesium; the viewer's scripts/draw_models.ts documents jobs."""
     listed = folder / "jobs.json"
     listed.write_text(json.dumps(jobs, default=str))
     command = ["npx", "tsx", "scripts/draw_models.ts", str(listed)]
@@ -70,7 +70,7 @@ def draw_for_the_web(jobs: list[dict[str, object]], folder: Path) -> None:
 
 
 def draw_by_blender(jobs: list[dict[str, object]], folder: Path) -> None:
-    """Draw files by Blender and by the add-on; each job as blender/draw.py has it."""
+    """Draw files by Blender and by the add-on; blender/draw.py documents the jobs."""
     listed = folder / "blender.json"
     listed.write_text(json.dumps(jobs, default=str))
     command = [PYTHON, str(REPOSITORY / "tests/blender/draw.py"), str(listed)]

@@ -1,4 +1,4 @@
-"""A contact sheet: a row a sample, a column a program and file, with what was measured."""
+"""A contact sheet: one row per sample, one column per program and file, with the measures."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,9 +9,9 @@ from support.dcc.pictures import Picture
 
 BACKDROP = (11, 13, 18)  # the viewer's background
 _MARGIN = (32, 34, 40)
-_WIDTH = 480  # pixels of a picture
-_LINE = 14  # pixels of a line of text
-_COLUMNS = 4  # of the pictures of a sample
+_WIDTH = 480  # pixels, width of a picture
+_LINE = 14  # pixels, height of a line of text
+_COLUMNS = 4  # pictures side by side
 
 
 def write_sheet(file: Path, samples: Mapping[str, Mapping[str, Picture]]) -> None:

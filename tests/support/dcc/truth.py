@@ -1,4 +1,4 @@
-"""Which channel each pixel of the view shows, by VTK: the programs' pictures are compared with it.
+"""Find by VTK which channel each pixel has to show, to compare the programs' pictures with it.
 
 Only the stage's geometry counts here, at the level and with the tiles that the stage shows.
 """
@@ -15,14 +15,14 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from support.dcc.view import View
 
-HAIR = 2e-3  # of the distance to the eye: two channels that are as near fight for the pixel
+HAIR = 2e-3  # share of the distance; two channels closer together than this count as equally near
 
 
 @dataclass(frozen=True, slots=True)
 class Truth:
     """The channel that each pixel of a view has to show.
 
-    channels  their names, and their linear colours: None where a mesh has colours of its own
+    channels  linear colour by the channel's name; None where a mesh has colours of its own
     shown     (height, width): the channel's number; -1 where there is nothing, -2 where two
               channels are equally near
     alone     (height, width): whether the pixel has no other channel behind the first

@@ -1,12 +1,12 @@
-"""Attacks on the server, by raw sockets, and the answers that are right.
+"""Attacks on the server by raw sockets, and the expected answers.
 
     PYTHONPATH=tests .venv/bin/python -m support.server.attacks
 
-serves a made-up bundle, runs all of them, prints a Markdown table of what was sent and what came,
-and exits with 1 if one was not refused, or the server wrote a line, or serves no more.
+serves a made-up bundle, runs all attacks, and prints a Markdown table of requests and answers. It
+exits with 1 if an attack got a wrong answer, or the server wrote a line or no longer serves.
 
-Limits in seconds are short here (DEADLINES), and the attacks on limits by number have small ones
-(FEW); that the usual ones are those of docs/server.md is tested in serve/test_attacks.py.
+Time limits are short here (DEADLINES), and attacks on limits by number meet small limits (FEW).
+serve/test_attacks.py tests that the usual limits are those of docs/server.md.
 """
 
 import logging
@@ -58,7 +58,7 @@ from support.server.raw_sockets import (
     without_tls,
 )  # fmt: skip
 
-MARK = "PATIENT-NAME"  # in what clients send: the server must not write it anywhere
+MARK = "PATIENT-NAME"  # part of requests; the server must not write it anywhere
 DEADLINES = [
     (HeadDeadline, "head_s", DEADLINE_S),
     (GuardedHttp, "stall_s", DEADLINE_S),
@@ -204,7 +204,7 @@ def _requests() -> Iterator[Attack]:
 
 
 def _heads() -> Iterator[Attack]:
-    """Those whose answers have no body, whoever refuses them."""
+    """Yield HEAD requests. The answer has no body, whichever part of the server refuses them."""
     upgrade = ("Upgrade: websocket", "Connection: Upgrade")
     many = [f"X-{k}: a" for k in range(MAX_HEADERS + 1)]
     for name, sent, right in (
@@ -231,7 +231,7 @@ def _heads() -> Iterator[Attack]:
 
 
 def _redirects() -> Iterator[Attack]:
-    """Where the answer to a token leads; and Starlette's own, of which there is none."""
+    """Yield paths whose redirect must stay on the server, and paths that must get none."""
     for path in (
         "//evil.example/",
         "///evil.example/",
@@ -349,7 +349,7 @@ def _sockets() -> Iterator[Attack]:
 
 
 def _limits() -> Iterator[Attack]:
-    """Those that use a client's share up; requests last."""
+    """Yield attacks that use up a client's share; the flood of requests comes last."""
     yield Attack("a crowd of connections", "20 are allowed here", crowd, ("503", "closed"), "few")
     yield Attack("a crowd of websockets", "4 are allowed here", socket_crowd, ("1013",), "few")
     yield Attack("a flood of requests", "60 are allowed here", flood, ("429",), "few")
@@ -412,7 +412,7 @@ ATTACKS: tuple[Attack, ...] = (
 
 
 def write_bundle(out: Path) -> Path:
-    """Write a bundle as far as it is served, with links that lead out; return its OUT."""
+    """Write the served files of a bundle, with links that lead out of it; return its OUT."""
     bundle = out / "bundle"
     (bundle / "channels").mkdir(parents=True)
     plain_bundle.write(out, {"index.html": b"<!doctype html>"})
@@ -428,7 +428,7 @@ def write_bundle(out: Path) -> Path:
 
 @contextmanager
 def attacked(out: Path) -> Iterator[dict[str, Target]]:
-    """Serve an OUT: all with short deadlines, "few" with small limits as well."""
+    """Serve an OUT by servers with short deadlines, and "few" with small limits as well."""
     patches = [patch.object(*one) for one in DEADLINES]
     servers: dict[str, BundleServer] = {}
     threads = []
@@ -471,7 +471,7 @@ def is_well(target: Target) -> bool:
 
 
 class Written(logging.Handler):
-    """What the server wrote to its log."""
+    """Collects the lines that the server logs."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -482,7 +482,7 @@ class Written(logging.Handler):
 
 
 def main(names: Sequence[str] = ()) -> int:
-    """Run those whose name begins with one of `names`, or all; print the table."""
+    """Run attacks whose name begins with one of `names`, or all; print the table."""
     written = Written()
     logging.getLogger().addHandler(written)
     wanted = [one for one in ATTACKS if not names or one.name.startswith(tuple(names))]

@@ -15,7 +15,7 @@ from support.sealed_files import seal
 
 
 def phantom(shape=(60, 75, 90)) -> np.ndarray:
-    """Return noisy balls in nothing, uint8 (z, y, x)."""
+    """Return noisy balls in an empty volume, uint8 (z, y, x)."""
     rng = np.random.default_rng(5)
     grid = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1)
     volume = np.zeros(shape)
@@ -27,7 +27,7 @@ def phantom(shape=(60, 75, 90)) -> np.ndarray:
 
 
 def write_out(folder: Path, volume: np.ndarray | None = None) -> Path:
-    """Write an OUT; spacing of the phantom is 1 um, its first drawn texel at the origin."""
+    """Write an OUT; the phantom's spacing is 1 um, and its first drawn texel is at the origin."""
     viewer = folder / "viewer"
     viewer.mkdir(parents=True)
     (viewer / "index.html").write_text("<!doctype html>")
@@ -38,7 +38,7 @@ def write_out(folder: Path, volume: np.ndarray | None = None) -> Path:
 
 
 def replace_volume(bundle: Path, voxels: np.ndarray, channel="CD31", tile="r0_c0") -> None:
-    """Put another volume in a bundle, as its volumes.json says it."""
+    """Put another volume in a bundle and in its volumes.json."""
     path = bundle / "channels" / channel / "volumes.json"
     content = json.loads(path.read_text("utf-8"))
     (entry,) = (e for e in content["volumes"] if e["tile"] == tile)
@@ -63,7 +63,7 @@ def replace_volume(bundle: Path, voxels: np.ndarray, channel="CD31", tile="r0_c0
         for level in texture.levels
     ]
     path.write_text(json.dumps(content))
-    manifest = bundle / "manifest.json"  # written anew, as a bundle's is
+    manifest = bundle / "manifest.json"  # a new file, as when a bundle is replaced
     text = manifest.read_text("utf-8")
     manifest.unlink()
     manifest.write_text(text)
@@ -72,7 +72,7 @@ def replace_volume(bundle: Path, voxels: np.ndarray, channel="CD31", tile="r0_c0
 def replace_transfer_functions(
     bundle: Path, opacities: np.ndarray, channel="CD31", names=("default",), chosen="default"
 ) -> None:
-    """Put other functions in a channel: opacities, (functions, 256) from 0 to 1; none is 2D."""
+    """Give a channel other 1D transfer functions: opacities (functions, 256) from 0 to 1."""
     manifest = bundle / "manifest.json"
     content = json.loads(manifest.read_text("utf-8"))
     (entry,) = (c for c in content["channels"] if c["id"] == channel)

@@ -1,6 +1,6 @@
-"""A client of `/bricks` in numpy, without a network: what comes goes in, answers come out.
+"""A client of `/bricks` in numpy, without a network: it takes messages and returns answers.
 
-docs/brick-stream.md is what it was written from; the browser's does the same.
+It was written from docs/brick-stream.md, and does what the browser's client does.
 """
 
 import json
@@ -38,7 +38,7 @@ class BrickClient:
     table_bytes: int = 0
 
     def take(self, data: str | bytes, tables: dict[str, bytes] | None = None) -> list[dict]:
-        """Take in a message; return what has to be answered. tables: a cache by hash."""
+        """Take in a message; return the answers. tables: a cache by hash."""
         if isinstance(data, str):
             return self._take_text(json.loads(data), tables or {})
         frame = decode_frame(data)
@@ -80,7 +80,7 @@ class BrickClient:
         return tree in self.trees and self.trees[tree].table is not None
 
     def have(self, tree: int) -> dict:
-        """Return the message that names the bricks at hand."""
+        """Return the message that names the cached bricks."""
         bits = np.zeros(len(self.trees[tree].table.nodes), dtype=np.uint8)
         bits[list(self.trees[tree].frames)] = 1
         packed = np.packbits(bits, bitorder="little").tobytes()
@@ -90,7 +90,7 @@ class BrickClient:
 def reconstruct(table: Table, frames: dict[int, bytes]) -> np.ndarray:
     """Return the volume (z, y, x), float32, that a client draws with these bricks.
 
-    Every texel is sampled in the finest brick there is; nothing has come: 0.
+    Every texel is sampled in the finest available brick; without a brick it is 0.
     """
     volume = np.zeros(table.size, dtype=np.float32)
     for i, node in enumerate(table.nodes):  # breadth first: finer bricks come later
@@ -119,7 +119,7 @@ def psnr(found: np.ndarray, truth: np.ndarray) -> float:
 
 
 def look_at(eye, target, fov_y=np.pi / 4, aspect=1.0, near=1.0, far=1e5) -> dict:
-    """Return clip (column-major), eye and gaze of a camera, as the message `view` has them."""
+    """Return clip (column-major), eye and gaze of a camera for the message `view`."""
     eye, target = np.array(eye, float), np.array(target, float)
     forward = (target - eye) / np.linalg.norm(target - eye)
     up = np.array([0, 1.0, 0]) if abs(forward[1]) < 0.99 else np.array([0, 0, 1.0])

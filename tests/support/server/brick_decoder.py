@@ -36,7 +36,7 @@ def decode_brick(frame: bytes) -> Bytes3:
 
 
 def decode_frame(data: bytes) -> Frame:
-    """Return a binary frame; a table's `data` comes uncompressed. Raises BrickFormatError."""
+    """Return a binary frame; the `data` of a table is unpacked. Raises BrickFormatError."""
     if len(data) < FRAME.size:
         raise BrickFormatError(f"a frame of {len(data)} bytes, expected {FRAME.size} or more")
     kind, version, _, sequence, view, count = FRAME.unpack_from(data)
@@ -58,7 +58,7 @@ def decode_frame(data: bytes) -> Frame:
 
 
 def first_children(nodes: NDArray[np.void]) -> NDArray[np.int64]:
-    """Return the index of each node's first child, int64 (n + 1,); at the end, the number of nodes.
+    """Return the index of each node's first child, int64 (n + 1,). The last value is n.
 
     nodes  records of NODE (n,)
     """

@@ -1,8 +1,8 @@
-"""Attacks on an inbox: names, lists, addresses, offsets, bodies, archives, and the answers.
+"""Attacks on an inbox by names, lists, addresses, offsets, bodies and archives, with the answers.
 
     PYTHONPATH=tests .venv/bin/python -m support.server.inbox_attacks
 
-prints how many there are of each kind. tests/inbox/test_attacks.py runs all of them.
+prints the number of attacks of each kind. tests/inbox/test_attacks.py runs all of them.
 """
 
 import gzip
@@ -16,14 +16,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-MARK = "PATIENT-NAME"  # in what clients send: no answer, file or line may repeat it
-ITEM = "ITEM"  # in a path: the ID of an upload that has begun, of SIZE bytes
+MARK = "PATIENT-NAME"  # part of requests; no answer, file or line may repeat it
+ITEM = "ITEM"  # in a path, stands for the ID of a begun upload of SIZE bytes
 SIZE = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One request that must be refused with one of these statuses, in one line."""
+    """One request that must be refused in one line, with one of these statuses."""
 
     name: str
     method: str
@@ -35,7 +35,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Archive:
-    """An archive whose item must fail with a line of this beginning."""
+    """An archive whose item must fail with a line that begins like this."""
 
     name: str
     file: str
@@ -49,7 +49,7 @@ def _announced(name: str, content: Any, *right: int) -> Request:
 
 
 def names() -> Iterator[Request]:
-    """Yield names of files that are paths, or no names."""
+    """Yield names of files that are paths, or that are not names."""
     for about, name in {
         "dots": f"../{MARK}.dcm",
         "dots inside": f"a/../../{MARK}.dcm",
@@ -105,7 +105,7 @@ def names() -> Iterator[Request]:
 
 
 def lists() -> Iterator[Request]:
-    """Yield bodies that announce nothing, too much, or something else."""
+    """Yield announcements of no files, of too many, or of other things than files."""
     many = [[f"{k}", 1] for k in range(301)]
     for about, content, right in (
         ("no JSON", b"{", 400),
@@ -148,7 +148,7 @@ def lists() -> Iterator[Request]:
 
 
 def addresses() -> Iterator[Request]:
-    """Yield addresses that a person at another machine may not let this one ask."""
+    """Yield addresses that a person at another machine may not make this machine ask."""
     inside = (
         *("127.0.0.1", "127.1", "127.0.1", "2130706433", "0x7f000001", "0x7f.0.0.1", "0177.0.0.1"),
         *("127.0.0.1:8000", "127.255.255.254", "0.0.0.0", "0", "localhost", "LOCALHOST"),
@@ -210,7 +210,7 @@ def addresses() -> Iterator[Request]:
 
 
 def pieces() -> Iterator[Request]:
-    """Yield pieces that lie elsewhere, are longer, or are no pieces."""
+    """Yield pieces with a wrong or malformed offset, or of a wrong length."""
     path = f"/items/{ITEM}/bytes"
     for about, offset, right in (
         ("none", None, 400),
@@ -298,7 +298,7 @@ def bodies() -> Iterator[Request]:
 
 
 def paths() -> Iterator[Request]:
-    """Yield paths to what is no item, or lies beside it."""
+    """Yield paths that lead to no item, or beside an item."""
     none = "0" * 16
     for about, method, path, right in (
         ("no item", "GET", f"/items/{none}/understood", 404),
@@ -366,7 +366,7 @@ def _zip(
     with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in members:
             info = zipfile.ZipInfo(name)
-            info.filename = name  # as it is, without zipfile's own tidying
+            info.filename = name  # unchanged, because ZipInfo() would clean the name
             info.compress_type = zipfile.ZIP_DEFLATED
             if change is not None:
                 change(info)
@@ -400,7 +400,7 @@ def _as_device(info: zipfile.ZipInfo) -> None:
 
 
 def archives() -> Iterator[Archive]:
-    """Yield archives whose members leave their folder, are no files, or are too much."""
+    """Yield archives whose members leave their folder, are not files, or are too large or many."""
     data = b"x" * 100
     for about, name in {
         "dots": f"../{MARK}",

@@ -1,4 +1,4 @@
-"""An inbox that is served on a free port, and a client that hands things in as a page does."""
+"""An inbox that is served on a free port, and a client that uploads files as the page does."""
 
 import http.client
 import json
@@ -25,11 +25,11 @@ from support.server.running import running
 from support.server.timeouts import PATIENCE_S, connect
 from support.small_viewer import write_small_viewer
 
-# small, so that tests reach them
+# Small limits that tests can reach.
 
 
 class NearReader:
-    """Stands in for the process of a reader: its imports would take seconds for each item."""
+    """Stands in for the process of a reader, whose imports would take seconds for each item."""
 
     def __init__(self, factory: Any) -> None:
         self._reader = factory()
@@ -46,7 +46,7 @@ LIMITS = InboxLimits(bytes=50_000_000, files=300, items=40, piece=1 << 20, reser
 
 
 class FakeBuilds:
-    """Makes builds that compute nothing, and records what they are asked for."""
+    """Makes builds that compute nothing, and records their arguments."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, Choices, bool]] = []
@@ -59,7 +59,7 @@ class FakeBuilds:
 
 
 class NearBuild(BuildProcess):
-    """A build without a process: it does what it is told, and ends when a test says so."""
+    """A build without a process. It follows commands, and ends when a test calls `end`."""
 
     def _start(self, coarse: Coarse | None) -> None:
         self.out.mkdir(exist_ok=True)
@@ -109,7 +109,7 @@ def serving_inbox(
     lan: bool = False,
     is_near: bool = True,
 ) -> Iterator[InboxServer]:
-    """Serve an inbox until the block ends; `folder` gets one folder of it, and one of its page.
+    """Serve an inbox until the block ends; `folder` gets a folder of the inbox and one of its page.
 
     is_near  read and build in the process of the test
     """
@@ -120,7 +120,7 @@ def serving_inbox(
     with patch.object(inbox_server, "viewer_dist", lambda: page):
         server = InboxServer(box, limits, make or FakeBuilds(), port=0, lan=lan)
     with ExitStack() as stack:
-        # a test may serve a second inbox within the first one: each sets its own classes
+        # A test may serve a second inbox within the first one, and each sets its own classes.
         child, process = (NearReader, NearBuild) if is_near else (Child, BuildProcess)
         stack.enter_context(patch.object(readers, "Child", child))
         stack.enter_context(patch.object(builds, "BuildProcess", process))
@@ -182,8 +182,8 @@ class InboxClient:
         return next(one for one in self.state()["items"] if one["id"] == item)
 
     def wait(self, item: str, *doings: str) -> dict[str, Any]:
-        """Return the state of an item once it does one of these."""
-        end_s = time.monotonic() + 5 * PATIENCE_S  # a build goes behind all else
+        """Return the state of an item once it is in one of these states."""
+        end_s = time.monotonic() + 5 * PATIENCE_S  # a build starts after all other work
         with connect(f"ws://localhost:{self.port}/events") as socket:
             while (left_s := end_s - time.monotonic()) > 0:
                 items = json.loads(socket.recv(timeout=left_s))["items"]
@@ -193,14 +193,14 @@ class InboxClient:
         raise AssertionError(f"{found['doing']} ({found['line']}), expected {doings}")
 
     def command(self, item: str, verb: str, body: Any = None) -> Any:
-        """Ask for a look, a build, a pause, ...; return the answer's content."""
+        """Send a command, such as a preview, a build or a pause; return the answer's content."""
         status, content, _ = self.ask("POST", f"/items/{item}/{verb}", body)
         assert status in (200, 202), content
         return content
 
 
 def files_below(folder: Path, top: str = "") -> list[tuple[str, bytes]]:
-    """Return the files of a folder as a browser lists a folder that is dropped."""
+    """Return the files of a folder as a browser lists them when the folder is dropped."""
     found = sorted(path for path in folder.rglob("*") if path.is_file())
     head = f"{top}/" if top else ""
     return [(f"{head}{one.relative_to(folder).as_posix()}", one.read_bytes()) for one in found]

@@ -1,4 +1,4 @@
-"""What an attack on the server sends over a raw socket, and how its answers are judged."""
+"""Send attacks to the server over raw sockets, and judge the answers."""
 
 import base64
 import os
@@ -16,10 +16,10 @@ from urllib.parse import urljoin, urlsplit
 from stereocell.serve.server import BundleServer
 
 SECRET = b"what lies beside the bundle"
-LARGE = 256 << 20  # sparse: more than sockets hold
-DEADLINE_S = 2.0  # a busy machine is slow to shake hands
+LARGE = 256 << 20  # bytes of a sparse file, more than the buffers of sockets hold
+DEADLINE_S = 2.0  # long enough for a TLS handshake on a busy machine
 WAIT_S = 32.0
-PROTECTION = (  # of every answer
+PROTECTION = (  # headers that every answer must have
     b"x-content-type-options: nosniff",
     b"referrer-policy: no-referrer",
     b"cross-origin-resource-policy: same-origin",
@@ -34,10 +34,10 @@ class Target:
     """A server that is attacked."""
 
     server: BundleServer
-    shakes_hands: bool = True  # where there is TLS
+    shakes_hands: bool = True  # does the TLS handshake, if the server has TLS
 
     def dial(self) -> socket.socket:
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # before: its time is not the handshake's
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # made first, because it takes time
         context.check_hostname = False
         context.verify_mode = ssl.CERT_NONE
         stream = socket.create_connection(("127.0.0.1", self.server.port), timeout=WAIT_S)
@@ -48,19 +48,19 @@ class Target:
 
 @dataclass(frozen=True)
 class Attack:
-    """right: the answers, of which one must come. "closed": the connection ends without a word."""
+    """right: the allowed answers; "closed" means that the connection ends without an answer."""
 
     name: str
     sent: str
     act: Callable[[Target], str]
     right: tuple[str, ...]
-    server: str = "plain"  # or "lan"; or "few", "few, lan": with small limits by number
+    server: str = "plain"  # or "lan"; "few" and "few, lan" have small limits by number
 
 
 def converse(stream: socket.socket, data: bytes, is_whole: Callable[[bytes], bool]) -> bytes:
-    """Send all that the server takes; return all that it says before it ends the connection.
+    """Send as much as the server takes; return all that it sends before it ends the connection.
 
-    Returns early once a whole answer is here and nothing is left to send. Raises TimeoutError if
+    Returns early after a whole answer if nothing is left to send. Raises TimeoutError if
     the server neither answers nor ends the connection.
     """
     said, left = b"", memoryview(data)
@@ -87,7 +87,7 @@ def converse(stream: socket.socket, data: bytes, is_whole: Callable[[bytes], boo
 
 
 def is_answer(said: bytes) -> bool:
-    """Return whether an HTTP answer that is kept open is here with its body."""
+    """Return whether an HTTP answer on an open connection has arrived with its body."""
     head, _, body = said.partition(b"\r\n\r\n")
     fields = dict(line.lower().split(b": ", 1) for line in head.split(b"\r\n")[1:] if b": " in line)
     is_kept = fields.get(b"connection") != b"close" and b"content-length" in fields
@@ -95,7 +95,7 @@ def is_answer(said: bytes) -> bool:
 
 
 def judge(said: bytes) -> str:
-    """Return the status of the last answer, or what is wrong with one."""
+    """Return the status of the last answer, or a description of a fault in one of the answers."""
     if not said:
         return "closed"
     if SECRET in said:
@@ -118,7 +118,7 @@ def get(path: str, *headers: str, method: str = "GET", host: str = "localhost") 
 
 
 def raw(data: bytes, count: int = 1) -> Callable[[Target], str]:
-    """Return an attack that sends bytes; count: of answers that may come."""
+    """Return an attack that sends bytes; count: number of answers that may come."""
 
     def act(target: Target) -> str:
         with target.dial() as stream:
@@ -134,7 +134,7 @@ def raw(data: bytes, count: int = 1) -> Callable[[Target], str]:
 
 
 def bare(data: bytes) -> Callable[[Target], str]:
-    """Return an attack whose answer must be a head alone, as that to a HEAD."""
+    """Return an attack whose answer must be a head without a body, as for HEAD requests."""
 
     def act(target: Target) -> str:
         with target.dial() as stream:
@@ -146,7 +146,7 @@ def bare(data: bytes) -> Callable[[Target], str]:
 
 
 def landing(path: str) -> Callable[[Target], str]:
-    """Return an attack that follows a redirect as browsers do: "own" is where it should lead."""
+    """Return an attack that follows a redirect as browsers do; "own" if it stays on the server."""
 
     def act(target: Target) -> str:
         assert target.server.gate is not None
@@ -161,7 +161,7 @@ def landing(path: str) -> Callable[[Target], str]:
         base = urlsplit(target.server.address)
         whole = urlsplit(urljoin(target.server.address, shown))
         is_own = (whole.scheme, whole.netloc) == (base.scheme, base.netloc)
-        # and whose parts are taken out once more before they are read again
+        # A page may take the path out of the address and resolve it again.
         again = urljoin(target.server.address, whole.path)
         return "own" if is_own and urlsplit(again).netloc == base.netloc else shown
 
@@ -203,7 +203,7 @@ def never_reading(target: Target) -> str:
 
 
 def crowd(target: Target) -> str:
-    """Open more connections than a client may have; the next one is turned away."""
+    """Open more connections than a client may have; the server refuses the next one."""
     streams = [target.dial() for _ in range(20)]
     try:
         time.sleep(0.1)
@@ -220,7 +220,7 @@ def without_tls(act: Callable[[Target], str]) -> Callable[[Target], str]:
 
 
 def silent_crowd(target: Target) -> str:
-    """Open more connections than a client may have, and say nothing; the next one is cut off."""
+    """Open more connections than a client may have, send nothing; the server cuts the next one."""
     streams = [replace(target, shakes_hands=False).dial() for _ in range(20)]
     try:
         time.sleep(0.05)
@@ -234,7 +234,7 @@ def silent_crowd(target: Target) -> str:
 
 
 def flood(target: Target) -> str:
-    """Send more requests than a client may, on connections that are kept."""
+    """Send more requests than a client may, on connections that stay open."""
     for _ in range(80):
         found = raw(get("/manifest.json"))(target)
         if found != "200":
@@ -245,7 +245,7 @@ def flood(target: Target) -> str:
 def frame(
     opcode: int, payload: bytes = b"", fin: int = 1, mask: int = 1, rsv: int = 0, length: int = -1
 ) -> bytes:
-    """Return a frame (RFC 6455, section 5.2), masked with 0, right or wrong."""
+    """Return a frame (RFC 6455, section 5.2), masked with 0; it may be valid or faulty."""
     size = len(payload) if length < 0 else length
     head = struct.pack(">BBQ", fin << 7 | rsv << 4 | opcode, mask << 7 | 127, size)
     if size < 126:
@@ -265,7 +265,7 @@ HELLO = frame(1, b'{"type": "hello", "version": 1}')
 
 
 def open_socket(target: Target) -> tuple[socket.socket, bytes]:
-    """Return a stream with an open websocket, and what came behind the handshake."""
+    """Return a stream with an open websocket, and the bytes that followed the handshake."""
     stream = target.dial()
     stream.sendall(handshake().replace(b"{port}", str(target.server.port).encode()))
     said = b""
@@ -279,7 +279,7 @@ def open_socket(target: Target) -> tuple[socket.socket, bytes]:
 
 
 def closing(said: bytes) -> str:
-    """Return the code of the close frame among frames of a server."""
+    """Return the code of the close frame among the server's frames."""
     while len(said) >= 2:
         size, at = said[1] & 127, 2
         if size == 126:

@@ -9,15 +9,15 @@ import numpy as np
 from support.server.brick_client import BrickClient, look_at
 from support.server.timeouts import connect
 
-_SMALL = ([0, -48, 0], [36, 0, 32])  # opposite corners of small specimens of tests, um
+_SMALL = ([0, -48, 0], [36, 0, 32])  # um, opposite corners of a box round tests' small specimens
 
 
 def sent(
     port: int, path: str, volumes: list[dict[str, str]], box: Sequence[Sequence[float]] = _SMALL
 ) -> BrickClient:
-    """Return a client that was sent all bricks of these volumes, or the errors for them.
+    """Return a client that has received all bricks of these volumes, or the errors for them.
 
-    box  opposite corners of what a camera looks at, which stands before it, um
+    box  um, opposite corners of the box that the camera looks at from the front
     """
     client, opened = BrickClient(), 0
     with connect(f"ws://localhost:{port}{path}") as socket:

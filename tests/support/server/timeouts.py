@@ -1,4 +1,4 @@
-"""How long a test's client waits for an answer: a busy machine is slow, and no fault."""
+"""How long a test's client waits for an answer. A slow answer of a busy machine is not a fault."""
 
 from functools import partial
 

@@ -1,9 +1,9 @@
-"""With this folder on PYTHONPATH StereoCell finds of the standard library only what Windows has.
+"""Hide from StereoCell what Windows lacks, in processes with this folder on PYTHONPATH.
 
-Its modules, and no others, are told that the system is `win32`; the rest of Python and the
-libraries keep what they need of this one. Files are held to Windows' rules at and below the
-current folder: names, and that an open file is neither removed nor moved, nor a folder around it.
-Text files want an encoding, which differs there.
+StereoCell's modules see the platform `win32` and only the parts of the standard library that
+Windows has. Other modules see this system. At and below the current folder, files must keep to
+Windows' rules: a name must be allowed, and an open file and its folders can be neither removed nor
+moved. Text files must be opened with an encoding, because the default differs on Windows.
 """
 
 import builtins
@@ -63,7 +63,7 @@ def fault_of(path: str) -> str:
 
 
 class _Part(ModuleType):
-    """A module without some of its names; the others are the module's at any time."""
+    """A module without some of its names; other names are looked up in the module each time."""
 
     def __init__(self, whole: ModuleType, without: set[str], **instead: object) -> None:
         super().__init__(whole.__name__)
@@ -100,7 +100,7 @@ def _import_for(
 def _without_proc(function: Any) -> Any:
     def wrapped(path: Path, *rest: Any, **options: Any) -> Any:
         caller = sys._getframe(1).f_globals.get("__name__", "")
-        # by cpuinfo compiled kernels are found: without, they would be compiled anew
+        # numba finds compiled kernels by cpuinfo; without it, it would compile them again.
         if str(path).startswith("/proc") and path.name != "cpuinfo" and "stereocell" in caller:
             path = Path("no such folder")
         return function(path, *rest, **options)
@@ -109,7 +109,7 @@ def _without_proc(function: Any) -> Any:
 
 
 def _guard_files(folder: str) -> None:
-    """Hold files at and below a folder to Windows' rules."""
+    """Enforce Windows' rules for files at and below a folder."""
 
     def inside(path: Any) -> str:
         path = (
@@ -137,7 +137,7 @@ def _open_files() -> list[str]:
     for number in os.listdir("/proc/self/fd"):
         try:
             found.append(os.readlink(f"/proc/self/fd/{number}"))
-        except OSError:  # that of the list itself
+        except OSError:  # the descriptor of the list itself, closed by now
             continue
     return found
 
@@ -145,6 +145,6 @@ def _open_files() -> list[str]:
 builtins.__import__ = _import_for
 for name in ("read_text", "read_bytes", "exists"):
     setattr(Path, name, _without_proc(getattr(Path, name)))
-warnings.filterwarnings("ignore", category=EncodingWarning)  # of libraries
+warnings.filterwarnings("ignore", category=EncodingWarning)  # warnings about libraries
 warnings.filterwarnings("error", category=EncodingWarning, module=r"stereocell\b")
 _guard_files(os.getcwd())

@@ -1,10 +1,10 @@
 /**
- * NiiVue: its volume rendering, as its API leaves it. No setting: its step is a voxel.
+ * NiiVue: volume rendering with the defaults of its API. There is no setting; a step is a voxel.
  *
- * What differs, and no option changes: only parallel projection; colour and opacity are looked up
- * at the voxels and then interpolated; opacities below 0.01 are left out; rays end at 0.95, are
- * then scaled to 1, and start at random within a step; the picture is premultiplied, and blended
- * as if it were not, which darkens what is translucent.
+ * These differences can't be changed by options. Projection is parallel. Colour and opacity are
+ * looked up at the voxels and then interpolated. Opacities below 0.01 are ignored. Rays start at
+ * random within a step, end at an opacity of 0.95, and are then scaled to 1. The picture is
+ * premultiplied but blended as if it were not, which darkens translucent parts.
  */
 import { Niivue, NVImage, SLICE_TYPE } from "@niivue/niivue";
 import { serve } from "./page";
@@ -64,7 +64,7 @@ class NiiVue implements Renderer {
   }
 }
 
-/** Size, spacing, matrix, type and voxels of a NIfTI: right is x, front is -z, up is y. */
+/** Make a NIfTI file in memory: right is x, front is -z, up is y. */
 function standing(scene: Scene): [number[], number[], number[], number, Uint8Array] {
   const [nx, ny, nz] = scene.about.size;
   const [hx, hy, hz] = scene.about.spacing_um;

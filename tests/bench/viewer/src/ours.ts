@@ -1,4 +1,4 @@
-/** Ours: the viewer's own march. Setting: 1 with its light, 0 without. */
+/** Ours: the viewer's ray march. Setting: 1 with its light, 0 without. */
 import {
   ClampToEdgeWrapping,
   Data3DTexture,
@@ -33,7 +33,7 @@ class Ours implements Renderer {
   private readonly encode = new EncodePass();
   private readonly eyes = new Eyes();
   private readonly camera = new PerspectiveCamera();
-  /** What is marched, and what it is laid over: a room that is empty but for that. */
+  /** The scene that is marched, and the scene of overlays, which is otherwise empty. */
   private readonly marched = new Room();
   private readonly room = new Room();
   private march: TileMarch | null = null;
@@ -67,7 +67,7 @@ class Ours implements Renderer {
     this.camera.updateMatrixWorld();
   }
 
-  /** All that the viewer does in a frame that has a volume. */
+  /** Draw all passes of the viewer for a frame with a volume. */
   draw(): void {
     this.eyes.followScreen(this.renderer, this.camera);
     this.depth.render(this.renderer, this.room, this.eyes, this.pass.overlays);

@@ -1,4 +1,4 @@
-/** What the driver calls in a page that holds one renderer. */
+/** Functions that the driver calls in a page with one renderer. */
 import { fetchScene, type Renderer } from "./scene";
 
 export type Bench = Readonly<{

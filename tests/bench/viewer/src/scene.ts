@@ -1,4 +1,4 @@
-/** What is drawn, as scene.py writes it, and what each renderer has to offer. */
+/** The scene that scene.py writes, and the interface of a renderer. */
 export type Triple = readonly [number, number, number];
 
 /** World: x right, y up, z to the viewer; um. With fov_deg perspective, else parallel. */
@@ -16,7 +16,7 @@ export type About = Readonly<{
   /** The box from the second voxels' centres to the last but one: an apron of one voxel. */
   low_um: Triple;
   high_um: Triple;
-  /** 256 RGBA of 8 bits: RGB is a factor to the colour, A the opacity of a voxel's length. */
+  /** 256 RGBA of 8 bits: RGB is a factor of the colour, A the opacity over a voxel's length. */
   table: readonly number[];
   /** Linear RGB. */
   color: Triple;
@@ -32,13 +32,13 @@ export type Scene = Readonly<{
   bricks: Uint8Array<ArrayBuffer>;
 }>;
 
-/** A number that the renderer's users set, such as the step in voxels; what it means is its own. */
+/** A number that the renderer's users set, such as the step in voxels; its meaning differs. */
 export type Setting = number;
 
 export interface Renderer {
-  /** Make ready to draw into `parent`, which is as large as the picture. */
+  /** Prepare to draw into `parent`, which has the size of the picture. */
   setup(scene: Scene, camera: Camera, setting: Setting, parent: HTMLElement): Promise<void>;
-  /** Ask for one picture; whoever calls reads its pixels, which waits for it. */
+  /** Start to draw one picture. The caller waits for it by reading its pixels. */
   draw(): void;
   /** The context that holds the picture. */
   readonly gl: WebGL2RenderingContext;
@@ -53,7 +53,7 @@ export async function fetchScene(name: string): Promise<Scene> {
   return { about, voxels: bytes.slice(0, count), bricks: bytes.slice(count) };
 }
 
-/** The voxels with rows along world y, as the peers want them. */
+/** Return the voxels with rows along world y, which other renderers need. */
 export function upright({ about, voxels }: Scene): Uint8Array<ArrayBuffer> {
   const [nx, ny, nz] = about.size;
   const flipped = new Uint8Array(voxels.length);
@@ -66,7 +66,7 @@ export function upright({ about, voxels }: Scene): Uint8Array<ArrayBuffer> {
   return flipped;
 }
 
-/** sRGB 0..1 of the scene's colour: the peers blend what the screen shows. */
+/** Return the scene's colour as sRGB 0..1, because other renderers blend encoded colours. */
 export function shownColor({ color }: About): number[] {
   return color.map((v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055));
 }

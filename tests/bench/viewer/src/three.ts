@@ -1,10 +1,10 @@
 /**
- * three's own example: `VolumeRenderShader1` of its package. Setting: step in voxels; 0 is the
- * shader untouched, which shows the largest value along the ray and not the transfer function.
+ * three's own example: `VolumeRenderShader1` of its package. Setting: step in voxels. 0 leaves the
+ * shader unchanged, which shows the largest value along the ray and not the transfer function.
  *
- * The example has no blending by opacity, so the body of its `cast_mip` is put in the place of the
- * plainest loop that has: one look-up a step, front to back, all the way. Its ray, its steps and
- * its tables are as they were. Opacities in the table are those of a step.
+ * The example has no blending by opacity, so the plainest such loop replaces the body of its
+ * `cast_mip`: one look-up per step, front to back, to the end of the ray. Ray, steps and tables are
+ * unchanged. Opacities in the table are those of a step.
  */
 import {
   BackSide,
@@ -44,7 +44,7 @@ const BLENDING = `${HEAD} {
 }
 `;
 
-/** The example's shader with another body of cast_mip, and the step that is asked for. */
+/** Return the example's shader with another body of cast_mip, and the given step. */
 function blending(step: number): string {
   const text = VolumeRenderShader1.fragmentShader;
   const from = text.indexOf(`${HEAD} {`);
@@ -94,7 +94,7 @@ class Three implements Renderer {
     const mesh = new Mesh(box, material);
     const [hx, hy, hz] = about.spacing_um;
     mesh.scale.set(hx, hy, hz);
-    // Its texture coordinates are half a voxel low: its voxels 0 lie where coordinates 0 are.
+    // Its texture coordinates are half a voxel too low: it puts voxel 0 at coordinate 0.
     mesh.position.set(-0.5 * hx, (0.5 - ny) * hy, -0.5 * hz);
     this.room.add(mesh);
     const [width, height] = about.size_px;
@@ -116,7 +116,7 @@ class Three implements Renderer {
   }
 }
 
-/** Colour, and the opacity of a step of so many voxels, in half floats. */
+/** Return colours, and opacities of a step of this many voxels, in half floats. */
 function tableOf({ about }: Scene, step: number): DataTexture {
   const rgb = shownColor(about);
   const texels = new Uint16Array(1024);

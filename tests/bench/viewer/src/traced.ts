@@ -1,4 +1,4 @@
-/** Ours, by paths of light: what one more sample of every pixel costs, with all that follows it. */
+/** Ours with path tracing: one more sample of every pixel, with all passes that follow. */
 import {
   ClampToEdgeWrapping,
   Data3DTexture,
@@ -56,7 +56,7 @@ class Traced implements Renderer {
     return this.renderer.getContext() as WebGL2RenderingContext;
   }
 
-  /** Setting: 1 with many scatterings, 0 with one. */
+  /** Setting: 1 for multiple scattering, 0 for single scattering. */
   async setup(scene: Scene, camera: Camera, setting: number, parent: HTMLElement): Promise<void> {
     const { about, voxels, bricks } = scene;
     const [width, height] = about.size_px;
