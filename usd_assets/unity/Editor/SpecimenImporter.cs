@@ -23,7 +23,7 @@ namespace StereoCell.Editor
         public override void OnImportAsset(AssetImportContext ctx)
         {
             ctx.DependsOnSourceAsset(SpecimenBuilder.ShaderPath);
-            ctx.DependsOnCustomDependency(BundleWatcher.PipelineName);  // glTFast makes its materials for one render pipeline
+            ctx.DependsOnCustomDependency(BundleWatcher.PipelineName);  // glTFast's materials are for one pipeline
             GameObject root = null;
             try
             {

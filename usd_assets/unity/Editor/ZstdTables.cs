@@ -180,7 +180,7 @@ namespace StereoCell.Editor
                 Log = HighBit((uint)total) + 1;
                 var rest = (1 << Log) - total;
                 if (Log > 11 || (rest & rest - 1) != 0) throw Broken("codes that do not add up");
-                weights[count] = (byte)(HighBit((uint)rest) + 1);  // the file leaves out the last symbol's weight, which follows from the others
+                weights[count] = (byte)(HighBit((uint)rest) + 1);  // the last weight is not stored; it follows
                 Symbol = new byte[1 << Log];
                 Bits = new byte[1 << Log];
                 var at = 0;
