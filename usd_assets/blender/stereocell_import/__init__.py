@@ -146,6 +146,7 @@ def _export_entry(menu, _context):
 
 
 def register():
+    """Register the add-on's classes and menu entries; Blender calls this."""
     bpy.utils.register_class(ImportStereoCellStage)
     bpy.utils.register_class(ExportStereoCellEdits)
     for one in CLASSES:
@@ -155,6 +156,7 @@ def register():
 
 
 def unregister():
+    """Remove the add-on's classes and menu entries; Blender calls this."""
     bpy.types.TOPBAR_MT_file_export.remove(_export_entry)
     bpy.types.TOPBAR_MT_file_import.remove(_import_entry)
     for one in reversed(CLASSES):
