@@ -611,7 +611,7 @@ def test_exposure_temperature_and_colors_above_white_reach_the_bundle(
     (lamp,) = [
         one for one in load(bundle / "manifest.json")["lights"]["lamps"] if "Ev" in one["name"]
     ]
-    # A sun of 2 W/m2 and three stops; a candle's red is far brighter than its blue.
+    # The sun has 2 W/m2 and an exposure of three stops. Its light is as red as that of a candle.
     red, green, blue = lamp["color"]
     assert red == 1
     assert 0.2 < green < 0.6

@@ -1,8 +1,8 @@
 """Small public volumes on which no constant was chosen; their truths come from other methods.
 
 They lie in the folder `level_corpus` of STEREOCELL_DATA. Each is an NPZ file with `voxels`
-(z, y, x), `truth` (bool; an empty array if it is unknown) and `spacing_um`. collect.py makes these
-files, and documents their sources and truths.
+(z, y, x), `truth` (bool; an empty array if it is unknown) and `spacing_um`. The files are made by
+collect.py, which documents their sources and truths.
 """
 
 from collections.abc import Iterator

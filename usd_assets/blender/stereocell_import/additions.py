@@ -1,4 +1,4 @@
-"""Write what an artist added to the scene: meshes, curves, texts, cameras and lights.
+"""Write objects that an artist added to the scene: meshes, curves, texts, cameras and lights.
 
 `stereocell bundle` takes meshes as layers of the viewer, cameras as its views, and suns and points
 as its lamps. Each object that has a surface becomes triangles: its shape at the current frame, with
@@ -101,7 +101,7 @@ def _write_surface(context, layer, block, matrix, names, lost):
     slots = {slot.material.name for slot in block.material_slots if slot.material}
     evaluated.to_mesh_clear()
     rows = np.array(matrix)
-    if np.linalg.det(rows[:3, :3]) < 0:  # a mirrored mesh has its outer side inwards
+    if np.linalg.det(rows[:3, :3]) < 0:  # mirroring turns the faces over
         vertices, normals = vertices[:, ::-1], normals[:, ::-1]
     points = points @ rows[:3, :3].T + rows[:3, 3]
     normals = normals @ np.linalg.inv(rows[:3, :3])

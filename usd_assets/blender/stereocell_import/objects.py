@@ -27,7 +27,7 @@ _VIRIDIS = (
     (0.058, 0.0, 0.089), (0.045, 0.078, 0.256), (0.013, 0.275, 0.271), (0.119, 0.584, 0.129),
     (0.984, 0.799, 0.019),
 )  # fmt: skip
-_items = {}  # Blender keeps no reference to what an enumeration's callback returns
+_items = {}  # keeps the results of callbacks for enumerations alive; Blender does not
 
 
 def read_columns(prim):
@@ -252,7 +252,7 @@ class RenameClass(_OfObjects):
 
 
 class ObjectsPanel(bpy.types.Panel):
-    """Beside the 3D view: what can be done with the objects of a label map"""
+    """The panel beside the 3D view that edits the objects of a label map."""
 
     bl_idname = "VIEW3D_PT_stereocell_objects"
     bl_label = "Objects"

@@ -253,7 +253,7 @@ def _write_moved(layer, state, root, objects, lost):
         if not _differ(matrix, before, _MOVED):
             continue
         name = path.rpartition("/")[2]
-        is_field = path.rpartition("/")[0] in state["leaves"]  # it moves with its volume
+        is_field = path.rpartition("/")[0] in state["leaves"]  # a field of a volume
         if is_field or not _is_placed(path, state):
             lost.append(f"the place of {name} is not taken over: {_why_it_stays(path, is_field)}")
             continue

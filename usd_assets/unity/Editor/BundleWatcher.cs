@@ -51,7 +51,7 @@ namespace StereoCell.Editor
                 }
                 catch (IOException)
                 {
-                    // The import of this asset says what is wrong with it.
+                    // The import of this asset reports the error.
                 }
             }
             if (isNew) AssetDatabase.Refresh();

@@ -120,7 +120,8 @@ namespace StereoCell.Editor
             for (var row = 0; row < 3; row++) material.SetVector("_ToBox" + row, place.ToBox[row]);
             material.SetFloat("_Voxel", place.Voxel);
             material.SetFloat("_MinStep", place.Voxel * (1 << level));
-            // Each tile on a ray takes at least one step, however short the ray's path through it. Steps are reserved.
+            // Each tile on a ray takes at least one step, however short the ray's path through it. Therefore one step is
+            // reserved for each other tile.
             material.SetFloat("_Spare", Math.Min(bundle.Tiles.Count - 1, 50));
             return material;
         }

@@ -67,8 +67,8 @@ namespace StereoCell
             get { return state.Target as Tile; }
         }
 
-        /// <summary>Switch the tile that is looked at now, for a button. The dwell then does not fire for this
-        /// tile.</summary>
+        /// <summary>Switch the tile that is looked at now, for a button. The dwell then does not fire until the
+        /// gaze has left this tile.</summary>
         public void Press()
         {
             if (Target == null) return;

@@ -21,7 +21,7 @@ float4 _Color3;
 float _Voxel;  // um: length of path for which the transfer functions state opacities
 float _MinStep;  // um: shortest step
 float _Steps;  // steps of the whole ray, at most MAX_STEPS
-float _Spare;  // steps that are reserved for the other tiles, one for each
+float _Spare;  // steps that are reserved for the other tiles, one for each but at most 50
 float _Shading;  // 0..1: share of the light by lamps
 float _Grain;  // 0..1: strength of the grain that replaces bands
 float _SceneDepth;  // 0 or 1: whether rays end at surfaces
