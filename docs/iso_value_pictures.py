@@ -1,9 +1,9 @@
-"""Draw the pictures of docs/choosing.md and docs/looks-wrong.md: `make docs-pictures`.
+"""Draw the images of docs/choosing.md and docs/looks-wrong.md: `make docs-pictures`.
 
     python docs/iso_value_pictures.py SAMPLE FOLDER
 
-SAMPLE is the volume of `stereocell sample cycif`. Builds of a part of it go into FOLDER, and
-pictures of their surfaces into docs/pictures. One has the iso-value that a build finds, one a lower
+SAMPLE is the volume of `stereocell sample cycif`. Builds of a part of it go into FOLDER, and images
+of their surfaces into docs/pictures. One build has the iso-value that a build finds, one a lower
 value, one a higher value, and one a wrong voxel spacing.
 """
 
@@ -17,7 +17,7 @@ from stereocell.cli.__main__ import main as run
 
 PICTURES = Path(__file__).parent / "pictures"
 QUALITY = 75  # quality of WebP, 0 to 100
-MAX_SIZE = (900, 1100)  # pixels; a picture of contours is larger
+MAX_SIZE = (900, 1100)  # pixels; larger images of contours are scaled down
 PART = ("--preset", "cycif", "--channels", "Hoechst", "--region", "0:48,0:96,0:192")
 BUILDS: Mapping[str, Sequence[str]] = {
     "iso-value-right": (),
@@ -29,7 +29,7 @@ CONTOURS = ("--channel", "CD31", "--tile", "r1_c2", "--preset", "cycif", "--grid
 
 
 def draw(sample: Path, folder: Path) -> None:
-    """Build each part, and write its picture."""
+    """Build each variant of the part, and write its image."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, flags in BUILDS.items():
         out, drawn = folder / name, folder / f"{name}.png"

@@ -1,4 +1,4 @@
-"""Write docs/licences.md from the metadata of the packages that are installed: `make licences`.
+"""Write docs/licences.md from the metadata of the installed packages: `make licences`.
 
 Each requirement's reason is the comment on its line in pyproject.toml.
 """
@@ -15,13 +15,13 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "licences.md"
-# packages whose metadata names no licence -> the licence in their files
+# Licences of packages whose metadata names none; they stand in the packages' files
 UNSTATED = {
     "alktx2": "none stated; it holds Basis Universal, Apache-2.0",
     "hdf5plugin": "MIT; its filters have their own (its file LICENSE)",
     "openexr": "BSD-3-Clause (its file LICENSE.md)",
 }
-# SPDX identifiers of licences, by their names in classifiers
+# SPDX identifiers of licences by their names in classifiers
 CLASSIFIERS = {
     "Apache Software License": "Apache-2.0",
     "BSD License": "BSD",
@@ -104,7 +104,7 @@ def _names_gpl(licence: str) -> bool:
 
 
 def closure(requirements: Iterable[Requirement]) -> dict[str, Distribution]:
-    """Return all installed packages that the requirements lead to, on this system."""
+    """Return the installed packages that the requirements need on this system, direct or not."""
     seen: set[tuple[str, str]] = set()
     found: dict[str, Distribution] = {}
     waiting = [(one, extra) for one in requirements for extra in ("", *one.extras)]

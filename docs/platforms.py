@@ -20,7 +20,7 @@ PAGE = ROOT / "docs" / "systems.md"
 BEGIN, END = "<!-- made by `make platforms` -->", "<!-- end of what it made -->"
 CORE = "StereoCell itself"
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-# system -> uv's names for it, from the oldest C library to newer ones that some extras need
+# uv's names of each system, from the oldest C library to newer ones that some extras need
 SYSTEMS = {
     "Linux x86-64": ("x86_64-manylinux_2_28", "x86_64-manylinux_2_35"),
     "Linux aarch64": ("aarch64-manylinux_2_28", "aarch64-manylinux_2_35"),
@@ -28,14 +28,14 @@ SYSTEMS = {
     "macOS x86-64": ("x86_64-apple-darwin",),
     "Windows x86-64": ("x86_64-pc-windows-msvc",),
 }
-_JOBS = 4  # resolutions at a time: they mostly wait for the registry
+_JOBS = 4  # parallel resolutions, which mostly wait for the registry
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
     """The result for one row on one system with one Python.
 
-    lacking  the package that has no wheel; empty: all packages have one
+    lacking  the package that has no wheel; empty if all packages have one
     newer    whether the packages need glibc 2.35
     """
 
@@ -64,14 +64,14 @@ def resolve(lines: Iterable[str], system: str, python: str, *flags: str) -> tupl
 
 
 def blamed(words: str) -> str:
-    """Return the package that uv names first as the reason."""
+    """Return the package that uv's message names first as the reason; "?" if it names none."""
     begin = r"Because (?:only )?(?:the following versions of )?"
     found = re.search(rf"{begin}([A-Za-z0-9._-]+)", " ".join(words.split()))
     return found[1] if found else "?"
 
 
 def find(lines: Iterable[str], systems: Iterable[str], python: str) -> Found:
-    """Return how requirements resolve on a system, with the oldest C library that suffices."""
+    """Return the result for requirements on a system, with the oldest C library that works."""
     lacking = ""
     for place, system in enumerate(systems):
         wheels, words = resolve(lines, system, python, "--only-binary", ":all:")
@@ -109,7 +109,7 @@ def spans(pythons: Iterable[str]) -> str:
 
 
 def table(found: Mapping[tuple[str, str, str], Found], day: date) -> str:
-    """Return the text between the markers; `found` is by row, system and Python."""
+    """Return the text between the markers; keys of `found` are row, system and Python."""
     return "\n".join([BEGIN, "", *_lines(found, day), "", END])
 
 

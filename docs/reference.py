@@ -1,7 +1,7 @@
-"""Pages of the documentation that are made from the program itself: a hook of MkDocs.
+"""Make pages of the documentation from the program itself, as a hook of MkDocs.
 
-The formats come from schemas/, the commands from their parser, the settings from their defaults,
-and the notebook is run, so that what it shows is what this version does.
+The formats come from schemas/, the commands from their parser, and the settings from their
+defaults. The notebook is run, so that its page shows the results of this version.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 NOTEBOOK = "notebook.ipynb"
 
-# page -> title, schema, what is in the file and where it lies
+# Title, schema and description of the page of each format, by the page's name
 FORMATS: dict[str, tuple[str, str, str]] = {
     "plan": (
         "Plan",
@@ -66,7 +66,7 @@ _OTHER_SCHEMA = re.compile(r"urn:stereocell:schema:(\w+):1#/([$\w]+)/")
 
 
 def pages() -> dict[str, str]:
-    """Return the Markdown of every page that is made, but for the notebook's, by its path."""
+    """Return the Markdown of every generated page except the notebook's, by its path."""
     made = {f"formats/{page}.md": format_page(*about) for page, about in FORMATS.items()}
     return made | {
         "formats/stage.md": stage_page(),
@@ -75,10 +75,10 @@ def pages() -> dict[str, str]:
     }
 
 
-# Links to pages that are made
+# Links to generated pages
 
 # A page in the repository can't link to a page that only the site has. It links to a line of
-# reference.md instead, and the hook replaces that link by one to the page itself.
+# reference.md instead, and the hook replaces this link with a link to the page itself.
 TARGETS = {
     **{name: f"formats/{name}.md" for name in FORMATS},
     "stage": "formats/stage.md",
@@ -90,16 +90,16 @@ _LINK = re.compile(r"\]\((?:\.\./)*reference\.md#([\w-]+)\)")
 
 
 def with_made_pages(markdown: str, path: str) -> str:
-    """Return a page that links to the pages that are made, not to lines of reference.md.
+    """Return a page whose links lead to generated pages instead of lines of reference.md.
 
-    path  of the page, below docs/, such as `formats/index.md`
+    path  path of the page below docs/, such as `formats/index.md`
     """
     up = "../" * path.count("/")
     return _LINK.sub(lambda link: f"]({up}{TARGETS[link[1]]})", markdown)
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
-    """Replace the links of a page: MkDocs calls this."""
+    """Replace the links of a page; MkDocs calls this."""
     return with_made_pages(markdown, page.file.src_uri)
 
 
@@ -134,7 +134,7 @@ def _table(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> str:
 def _rows(
     schema: Mapping[str, Any], prefix: str, defs: Mapping[str, Any]
 ) -> Iterator[tuple[str, bool, Mapping[str, Any]]]:
-    """Yield name, whether it is required, and schema of each field, those of nested objects too."""
+    """Yield each field, also of nested objects: its name, whether it is required, its schema."""
     required = schema.get("required", ())
     for name, field in schema.get("properties", {}).items():
         yield prefix + name, name in required, field
@@ -207,12 +207,12 @@ def _meaning(field: Mapping[str, Any], defs: Mapping[str, Any]) -> str:
 
 
 def _cell(text: str) -> str:
-    """Return prose as a table's cell: in one line, nothing in it taken for markup."""
+    """Return prose as one line for a cell of a table, with markup characters escaped."""
     return " ".join(text.split()).replace("|", "&#124;").replace("<", "&lt;").replace("*", "&#42;")
 
 
 def _layout(layout: Any) -> str:
-    """Return the table of a binary layout, or its JSON where it is none of fields."""
+    """Return the table of a binary layout, or its JSON if the layout does not list fields."""
     if not isinstance(layout, Mapping) or "fields" not in layout:
         return f"```json\n{json.dumps(layout, indent=2)}\n```"
     lines = ["| offset | field | type | value |", "|---|---|---|---|"]
@@ -230,7 +230,7 @@ def _layout(layout: Any) -> str:
 
 
 def stage_page() -> str:
-    """Return the page of the USD schemas that a stage's prims have."""
+    """Return the page of the USD schemas of a stage's prims."""
     from pxr import Sdf
 
     layer = Sdf.Layer.FindOrOpen(str(ROOT / "schemas" / "usd" / "schema.usda"))
@@ -266,7 +266,7 @@ def _plain(value: Any) -> Any:
 
 
 def commands_page() -> str:
-    """Return the page of every command's help."""
+    """Return the page with the help of every command."""
     from stereocell.cli import __main__ as cli
 
     (commands,) = (
@@ -282,7 +282,7 @@ def commands_page() -> str:
 
 
 def settings_page() -> str:
-    """Return the page of every setting, and of what each preset changes."""
+    """Return the page of all settings, with the settings that each preset changes."""
     from stereocell.planning import settings as settings_module
 
     parts = [
@@ -302,9 +302,9 @@ def settings_page() -> str:
 
 
 def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
-    """Return the Markdown of a notebook that was just run, and its pictures by name.
+    """Run a notebook; return its Markdown, and its images by name.
 
-    Raises nbclient's CellExecutionError where a cell fails.
+    Raises nbclient's CellExecutionError if a cell fails.
     """
     import nbformat
     from nbclient import NotebookClient
@@ -331,7 +331,7 @@ def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the pages that are made to those that are written: MkDocs calls this."""
+    """Add the generated pages to the written ones; MkDocs calls this."""
     from mkdocs.structure.files import File
 
     notebook, pictures = run_notebook(Path(config.docs_dir) / NOTEBOOK)

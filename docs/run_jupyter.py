@@ -2,8 +2,8 @@
 
     python docs/run_jupyter.py [FILE]
 
-The state of widgets is left out: a page without a kernel can do nothing with it, and it is as large
-as the pictures.
+The state of widgets is not stored. A page without a kernel cannot use it, and it is as large as the
+images.
 """
 
 import sys
@@ -19,14 +19,14 @@ NOTEBOOK = Path(__file__).with_name("jupyter.ipynb")
 def run(path: Path) -> Any:
     """Return the notebook with the outputs of this version.
 
-    Raises nbclient's CellExecutionError where a cell fails.
+    Raises nbclient's CellExecutionError if a cell fails.
     """
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(notebook, timeout=300, kernel_name="python3", store_widget_state=False)
     client.extra_arguments = ["--IPKernelApp.log_level=ERROR"]
     client.execute(cwd=str(path.parent))
     for cell in notebook.cells:
-        cell.metadata.pop("execution", None)  # when it ran
+        cell.metadata.pop("execution", None)  # times of the run
         for output in cell.get("outputs", ()):
             widget = output.get("data", {}).get("application/vnd.jupyter.widget-view+json")
             if widget:

@@ -1,16 +1,19 @@
-"""Draw files in Blender as an artist sees them first: by its own importers, and by the add-on.
+"""Render files in Blender after an import, by Blender's own importers or by the add-on.
 
-It runs in Blender's Python. Its argument is a file with a list of jobs:
-    file     what is opened
-    by       "blender", by its own importer into the default scene, or "add-on"
+This script runs in Blender's Python. Its argument is a JSON file with a list of jobs:
+    file     path of the file to open
+    by       "blender": Blender's own importer, into the default scene; or "add-on"
     view     the camera, in the numbers of the file; null: the file's own camera `mono`;
-             "default": Blender's own, drawn back until it has all in view
-    choices  of the add-on's import
-    engine   "CYCLES" if nothing else is named
-    pixels, samples, picture
+             "default": Blender's own camera, moved back until all meshes are in view
+    choices  options of the add-on's import
+    engine   renderer, "CYCLES" by default
+    pixels   width and height of the image
+    samples  samples per pixel, 16 by default
+    picture  path of the PNG to write
 
-A picture's alpha is the silhouette of what is drawn. Jobs share the process, but no scene. Unlike
-the steps of session.py they don't run in forks, in which images of OpenEXR wait for lost threads.
+The alpha of an image is the silhouette of the specimen. Jobs share the process, but each starts
+with a fresh scene. The jobs don't run in forks as the steps of session.py do: in a fork, OpenEXR
+waits for threads that no longer exist.
 """
 
 import json
@@ -29,7 +32,7 @@ import stereocell_import  # noqa: E402
 
 
 def open_plainly(job):
-    """Open a file by Blender's own importer, where the default scene's cube was."""
+    """Open a file with Blender's own importer in the default scene, without the scene's cube."""
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     file = job["file"]
     if file.endswith((".glb", ".gltf")):
@@ -44,7 +47,7 @@ def open_plainly(job):
 
 
 def add_camera(scene, view):
-    """Add a camera that looks along the -z of a file with y up, which is Blender's y."""
+    """Add a camera that looks along the file's -z, which is Blender's +y; the file has y up."""
     block = bpy.data.objects.new("view", bpy.data.cameras.new("view"))
     scene.collection.objects.link(block)
     x, y, z = view["eye"]
@@ -57,7 +60,7 @@ def add_camera(scene, view):
 
 
 def frame_by_default_camera(scene):
-    """Move the default scene's camera along its own direction, until all meshes are in view."""
+    """Aim the default scene's camera at the meshes from its own direction, with all in view."""
     bpy.context.view_layer.update()
     boxes = [
         block.matrix_world @ mathutils.Vector(corner)
@@ -74,7 +77,7 @@ def frame_by_default_camera(scene):
 
 
 def import_by_the_addon(job):
-    """Import a stage by the add-on into the default scene, as its menu does."""
+    """Import a stage into the default scene with the add-on's operator, as its menu does."""
     stereocell_import.register()
     done = bpy.ops.import_scene.stereocell(filepath=job["file"], **job.get("choices", {}))
     stereocell_import.unregister()
@@ -82,10 +85,10 @@ def import_by_the_addon(job):
 
 
 def render(job):
-    """Write a picture with few samples.
+    """Render the scene to a PNG with few samples.
 
-    EEVEE needs OpenGL 4.3 without a window; with Mesa's drawing by software, the first picture of a
-    process takes minutes, in which its shaders are compiled.
+    EEVEE needs OpenGL 4.3 without a window. With Mesa's software renderer, the first image of a
+    process takes minutes, because its shaders are compiled.
     """
     scene = bpy.context.scene
     scene.render.engine = job.get("engine", "CYCLES")

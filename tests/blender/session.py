@@ -1,9 +1,11 @@
-"""Run steps of the tests in this folder inside Blender's Python, each in a process of its own.
+"""Run steps of this folder's tests inside Blender's Python, each in its own process.
 
-Each line of standard input names a step, by a file of arguments: {"step", "arguments"}. The step's
-findings go to the file that the arguments name as `result`, as JSON, what it writes to that file
-with `.txt` behind its name; a line of standard output has its exit code. Blender is read once for
-all of them, which takes longer than most steps do.
+Each line of standard input is a JSON object: `step` is the name of a step, and `arguments` is the
+path of a JSON file with its arguments. The step's result is written as JSON to the file `result` of
+the arguments. The text that the step prints goes to the same name with `.txt` appended. One line of
+standard output has the exit code.
+
+Blender is loaded once for all steps, because loading takes longer than most steps do.
 """
 
 import json
@@ -14,13 +16,13 @@ import traceback
 from pathlib import Path
 from types import SimpleNamespace
 
-# Blender writes lines of its own to standard output
+# Blender prints its own lines to standard output, so the answers get a separate file descriptor.
 ANSWERS = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)
 
 import bpy  # noqa: E402
 
-# Blender's own pxr: an application has it on its path, the wheel does not
+# Blender the application has its own pxr on the path. The wheel bpy has not, so it is added here.
 LOCAL = Path(bpy.utils.resource_path("LOCAL"))
 sys.path += [str(path) for path in LOCAL.glob("python/lib/python3*/site-packages")]
 sys.path.append(str(Path(__file__).parents[2] / "usd_assets" / "blender"))
@@ -46,14 +48,14 @@ _FIELDS = (
 
 
 def import_stage(arguments):
-    """Import by the operator, as the menu does; return the root object."""
+    """Import with the operator, as the menu does; return the root object."""
     chosen = {key: arguments[key] for key in _FIELDS if key in arguments}
     assert bpy.ops.import_scene.stereocell(filepath=arguments["stage"], **chosen) == {"FINISHED"}
     return bpy.context.view_layer.objects.active
 
 
 def describe(root):
-    """Return what is in the scene, in units of the stage and by the paths of prims."""
+    """Return a description of the scene, in units of the stage and by the paths of prims."""
     bpy.context.view_layer.update()
     found = {"meshes": {}, "volumes": {}, "cameras": {}, "colors": {}, "functions": {}}
     to_stage = root.matrix_world.inverted()
@@ -102,7 +104,7 @@ def describe(root):
 
 
 def surface_color(material):
-    """Return the colour that a mesh is drawn with: along the link, through the channel's group."""
+    """Return the colour in which a mesh is drawn; follow the link to the channel's group."""
     (surface,) = [n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfPrincipled"]
     socket = surface.inputs["Base Color"]
     if not socket.links:
@@ -144,7 +146,7 @@ def step_objects(arguments):
 
 
 def step_edit_objects(arguments):
-    """Work on a label map's objects as its panel does, and export; return what was to be seen."""
+    """Edit a label map's objects with the panel's operators; export, and return what was seen."""
     root = import_stage(arguments)
     (block,) = [one for one in bpy.data.objects if one.get("stereocell_labels")]
     bpy.context.view_layer.objects.active = root
@@ -196,7 +198,7 @@ def step_edit_objects(arguments):
 
 
 def step_measured(arguments):
-    """Return what Blender's OpenVDB finds in the grid `measured` of a .vdb, at points."""
+    """Return the values that Blender's OpenVDB reads at points of the grid `measured` of a .vdb."""
     bpy.ops.object.volume_import(filepath=arguments["vdb"])
     volume = bpy.context.object
     mesh = bpy.data.meshes.new("points")
@@ -228,11 +230,11 @@ def step_measured(arguments):
 
 
 def step_refuse(arguments):
-    """Return the one line that a user sees."""
+    """Return the error message of an import; empty if the import succeeds."""
     chosen = {key: arguments[key] for key in _FIELDS if key in arguments}
     try:
         bpy.ops.import_scene.stereocell(filepath=arguments["stage"], **chosen)
-    except RuntimeError as error:  # how an operator's report reaches a script
+    except RuntimeError as error:  # an operator's error report becomes this exception in a script
         return str(error)
     return ""
 
@@ -243,7 +245,7 @@ def by_prim(path):
 
 
 def step_edit(arguments):
-    """Change what an artist would, and export it."""
+    """Make the edits that the arguments name, as an artist would, and export them."""
     root = import_stage(arguments)
     if "color" in arguments:
         channel, color = arguments["color"]
@@ -262,7 +264,7 @@ def step_edit(arguments):
         for element, (_, opacity) in zip(elements, points, strict=True):
             element.color = (1, 1, 1, opacity)
     for path in arguments.get("hide", []):
-        by_prim(path).hide_set(True)  # the key H
+        by_prim(path).hide_set(True)  # the same as the key H
     for path in arguments.get("delete", []):
         bpy.data.objects.remove(by_prim(path))
     for path, offset in arguments.get("move", {}).items():
@@ -362,7 +364,7 @@ def paint_other_uvs(root):
 
 
 def work_in_edit_mode(root):
-    """Move the points as an artist does, and export without leaving the mode."""
+    """Move the points of a mesh in edit mode, and stay in this mode for the export."""
     block = a_mesh(root)
     bpy.context.view_layer.objects.active = block
     bpy.ops.object.mode_set(mode="EDIT")
@@ -373,7 +375,7 @@ def work_in_edit_mode(root):
 
 
 def an_arrow(name):
-    """Add an object of one triangle; return it."""
+    """Add an object with one triangle; return it."""
     arrow = bpy.data.meshes.new(name)
     arrow.from_pydata([(0, 0, 0), (2, 4, 0), (-2, 4, 0)], [], [(0, 1, 2)])
     block = bpy.data.objects.new(name, arrow)
@@ -413,7 +415,7 @@ def light_by_area(_root):
 
 
 def shine(root):
-    """Add a sun by its exposure and temperature, and an arrow brighter than white."""
+    """Add a sun with an exposure and a temperature, and an arrow that is brighter than white."""
     bpy.ops.object.light_add(type="SUN")
     sun = bpy.context.active_object
     sun.name, sun.data.energy, sun.data.exposure = "Evening", 2.0, 3.0
@@ -441,7 +443,7 @@ def gold():
 
 
 def decorate(root):
-    """Add an arrow, a mirrored box, a text, a wire, a camera and lamps, as an artist does."""
+    """Add an arrow, a mirrored box, a text, a wire, a camera and lamps; edit lamps and opacity."""
     at_stage = root.matrix_world
 
     def add(block, place):
@@ -474,7 +476,7 @@ def decorate(root):
     bpy.ops.object.light_add(type="SUN")
     sun = bpy.context.active_object
     sun.name, sun.data.energy, sun.data.color = "Evening", 2.0, (1, 0.5, 0.25)
-    add(sun, Matrix.Rotation(math.pi / 2, 4, "Y"))  # it shines along -x
+    add(sun, Matrix.Rotation(math.pi / 2, 4, "Y"))  # the sun shines along -x
     bpy.ops.object.light_add(type="POINT")
     lamp = bpy.context.active_object
     lamp.name, lamp.data.energy = "Bulb", 2e4 * math.pi**2 * at_stage.to_scale().x ** 2
@@ -499,7 +501,7 @@ _ODD = {
 
 
 def step_render(arguments):
-    """Render a picture with Cycles: see test_blender.py for what is in it."""
+    """Render the stage with Cycles, with the colours and hidden objects of the arguments."""
     root = import_stage(arguments)
     bpy.context.view_layer.update()
     scene = bpy.context.scene
@@ -520,7 +522,7 @@ def step_render(arguments):
     scene.cycles.device = "CPU"
     scene.cycles.samples = arguments.get("samples", 16)
     scene.cycles.use_denoising = False
-    scene.cycles.volume_biased = True  # else 20 s before the first ray, whatever the picture's size
+    scene.cycles.volume_biased = True  # without it, the first ray takes 20 s at any image size
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = arguments.get("pixels", [320, 180])
     scene.render.image_settings.file_format = "PNG"
@@ -530,7 +532,7 @@ def step_render(arguments):
 
 
 def step_plain_import(arguments):
-    """Import a stage by Blender's own importer, without the add-on."""
+    """Import a stage with Blender's own importer; return its colours, lights and dome images."""
     bpy.context.scene.world = bpy.data.worlds.new("World")
     assert bpy.ops.wm.usd_import(filepath=arguments["stage"]) == {"FINISHED"}
     blocks = [block for block in bpy.data.objects if block.type == "MESH"]
@@ -544,7 +546,7 @@ def step_plain_import(arguments):
 
 
 def step_usdchecker(arguments):
-    """Return what `usdchecker` finds in files, in all variants: errors, warnings, failed checks."""
+    """Return the errors, warnings and failed checks of `usdchecker` for files, in all variants."""
     found = {}
     for name in arguments["files"]:
         checker = UsdUtils.ComplianceChecker(
@@ -564,7 +566,7 @@ def step_usdchecker(arguments):
 
 
 def faces_at_edges(data):
-    """Return how many edges of a mesh have 1, 2, ... faces, and its volume."""
+    """Return the number of edges of a mesh by their number of faces, and the mesh's volume."""
     shape = bmesh.new()
     shape.from_mesh(data)
     counts = {}
@@ -577,9 +579,9 @@ def faces_at_edges(data):
 
 
 def step_carve(arguments):
-    """Import a tile by Blender's own importer; cut a box out of each surface, and smooth it.
+    """Import a tile with Blender's own importer; cut a box out of each surface, then smooth it.
 
-    Returns the edges and the volume before and after each, and the names of the UVs.
+    Returns the edges and the volume before, after the cut and after smoothing, and the UVs' names.
     """
     assert bpy.ops.wm.usd_import(filepath=arguments["tile"]) == {"FINISHED"}
     found = {}
@@ -604,7 +606,7 @@ def step_carve(arguments):
 
 
 def step_lighting(arguments):
-    """Import into the startup scene; return what a picture of it would depend on."""
+    """Import into the startup scene; return the lights and settings that affect a render."""
     bpy.ops.wm.read_factory_settings()
     scene = bpy.context.scene
     world = scene.world.name
@@ -627,7 +629,10 @@ def step_lighting(arguments):
 
 
 def step_gltf(arguments):
-    """Open a glTF file by Blender's own importer; lengths in metres, z up."""
+    """Open a glTF file with Blender's own importer; return parents, colours and bounds.
+
+    The bounds are in metres, with z up.
+    """
     assert bpy.ops.import_scene.gltf(filepath=arguments["file"]) == {"FINISHED"}
     bpy.context.view_layer.update()
     meshes = [block for block in bpy.data.objects if block.type == "MESH"]
@@ -642,7 +647,7 @@ def step_gltf(arguments):
 
 
 def run(step, arguments):
-    """Run a step in a Blender that nothing has been done in."""
+    """Run a step in a Blender with an empty scene and factory settings."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     stereocell_import.register()
     result = globals()[f"step_{step}"](arguments)
@@ -651,7 +656,7 @@ def run(step, arguments):
 
 
 def run_forked(step, arguments):
-    """Run a step in a copy of this process, which ends with it; return its exit code."""
+    """Run a step in a fork of this process, which ends with the step; return its exit code."""
     child = os.fork()
     if child:
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])

@@ -1,14 +1,15 @@
-"""Draw a stage with Storm, the renderer that ships with USD, by the stage's own lights.
+"""Draw a stage with Storm, the renderer that ships with USD, lit by the stage's own lights.
 
-It runs in Blender's Python, whose package `bpy` has USD with Storm. OpenGL comes from EGL without
-a window. Arguments: the stage, the path of a camera, the PNG to write, its width.
+This script runs in Blender's Python, whose package `bpy` has USD with Storm. OpenGL comes from EGL,
+without a window. The arguments are the stage, the path of a camera, the PNG to write, and its width
+in pixels.
 """
 
 import ctypes
 import os
 import sys
 
-os.environ.setdefault("EGL_PLATFORM", "surfaceless")  # Mesa's, which draws without a GPU
+os.environ.setdefault("EGL_PLATFORM", "surfaceless")  # Mesa draws without a GPU
 
 # Constants from EGL/egl.h and from the extension EGL_KHR_create_context
 _SURFACE_TYPE, _PBUFFER, _RENDERABLE, _NONE = 0x3033, 0x0001, 0x3040, 0x3038
@@ -18,7 +19,7 @@ _WIDTH, _HEIGHT = 0x3057, 0x3056
 
 
 def make_context() -> None:
-    """Make a context of OpenGL 4.5 the current one. Raises RuntimeError where EGL has none."""
+    """Create an OpenGL 4.5 context and make it current. Raises RuntimeError if EGL has none."""
     egl = ctypes.CDLL("libEGL.so.1")
     for name in ("eglGetDisplay", "eglCreateContext", "eglCreatePbufferSurface"):
         getattr(egl, name).restype = ctypes.c_void_p
@@ -42,7 +43,7 @@ def _list(*attributes: int) -> ctypes.Array:
 
 
 def draw(stage_path: str, camera: str, picture: str, width: int) -> None:
-    """Draw a stage from one of its cameras, by the lights of the stage alone."""
+    """Draw a stage from one of its cameras, lit only by the stage's own lights."""
     import bpy
 
     bpy.utils.expose_bundled_modules()
@@ -62,4 +63,4 @@ if __name__ == "__main__":
     make_context()
     draw(*sys.argv[1:4], int(sys.argv[4]))
     sys.stdout.flush()
-    os._exit(0)  # USD's threads outlive the interpreter, and crash at its end
+    os._exit(0)  # USD's threads would crash when the interpreter ends

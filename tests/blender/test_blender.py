@@ -1,7 +1,7 @@
-"""The Blender add-on in headless Blender, from the import to the bundle of what was exported.
+"""The Blender add-on in headless Blender, from the import to a bundle with the exported edits.
 
-`make test-blender` runs it: Blender's Python is an environment of its own, named by
-STEREOCELL_BLENDER. See blender/session.py for what happens there.
+`make test-blender` runs these tests. Blender's Python is a separate environment, which
+STEREOCELL_BLENDER names. blender/session.py has the steps that run there.
 """
 
 import csv
@@ -42,7 +42,7 @@ def test_meshes_have_their_size_place_and_colour(stage_path: Path, tmp_path: Pat
     found = run("import", tmp_path, stage=stage_path, lod="lod0")
     meshes = found["meshes"]
     assert set(meshes) == {leaf(t, c) for t in ("r0_c0", "r0_c1") for c in (F_ID, BALL_ID)}
-    assert not found["volumes"]  # as the stage selects
+    assert not found["volumes"]  # the stage selects meshes only
     for path, mesh in meshes.items():
         color = COLORS[0] if F_ID in path else COLORS[1]
         assert mesh["color"] == pytest.approx(color, abs=1e-6)
@@ -56,14 +56,14 @@ def test_meshes_have_their_size_place_and_colour(stage_path: Path, tmp_path: Pat
         assert np.allclose(
             [mesh["low"], mesh["high"]], [points.min(axis=0), points.max(axis=0)], atol=1e-4
         )
-        # 1 unit is 1 um, and what is up stays up: Blender's z
+        # One unit is 1 um. The stage's up axis, y, becomes Blender's z.
         assert mesh["world"] == pytest.approx(np.ptp(points, axis=0), abs=1e-4)
     assert found["unit"] == pytest.approx(1e-6)
 
 
 @pytest.fixture(scope="module")
 def cells(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A build of a small tissue, and its table."""
+    """Build a small tissue; return the build's folder and the table of its cells."""
     folder = tmp_path_factory.mktemp("a tissue's")
     sample, out = folder / "small.ome.zarr", folder / "out"
     write_cells(sample, seed=2, shape=(24, 60, 60))
@@ -101,7 +101,7 @@ def test_objects_are_coloured_hidden_and_renamed_up_to_the_bundle(
     content = load(bundle / "channels/cells/objects.json")
     left = np.fromfile(bundle / content["labels"]["path"], "<u4")
     assert {str(label) for label in left} == set(labels) - gone
-    assert content["default"] == ""  # the objects' own colours are what was meant last
+    assert content["default"] == ""  # the last edit coloured single objects
     (kind,) = (one for one in content["columns"] if one["id"] == "cell_type")
     assert kind["categories"] == ["it's mine", *kinds[1:]]
     for level in range(4):
@@ -111,10 +111,10 @@ def test_objects_are_coloured_hidden_and_renamed_up_to_the_bundle(
         assert np.array_equal(is_blue, own[drawn.objects])
 
 
-def test_what_is_only_looked_at_is_no_edit_of_a_material(
+def test_changes_of_the_display_are_not_edits_of_a_material(
     cells: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    """Columns are shown by nodes, hidden objects by a modifier: neither is told as lost."""
+    """Nodes that show a column, and the modifier that hides objects, are not reported as lost."""
     overlay = tmp_path / "edit.usda"
     found = run(
         "edit_objects", tmp_path, stage=cells[0] / "stage/stage.usda", overlay=overlay, low=300.0,
@@ -130,7 +130,7 @@ def test_what_is_only_looked_at_is_no_edit_of_a_material(
 
 
 def test_objects_have_their_columns_and_classes(cells: tuple[Path, Path], tmp_path: Path) -> None:
-    """A column is an attribute of faces, a category a material slot in its colour."""
+    """A column becomes an attribute of faces; a category becomes a material slot in its colour."""
     out, table = cells
     found = run("objects", tmp_path, stage=out / "stage/stage.usda", lod="lod1")
     mesh = found[leaf("r0_c0", "cells")]
@@ -222,7 +222,7 @@ def test_the_dialog_offers_the_transfer_functions_that_all_channels_have(
 def test_a_function_of_more_points_than_a_ramp_holds_is_followed_closely(
     stage_path: Path, tmp_path: Path
 ) -> None:
-    """Blender's ramps end at 32 points; the greys of an MR have 33 of which some lie on a line."""
+    """Blender's ramps have at most 32 points; this function has 100."""
     x = np.linspace(0, 1, 100)
     points = np.stack([x, 0.5 + 0.4 * np.sin(6 * x)], axis=-1).astype(np.float32)
     layer = tmp_path / "over.usda"
@@ -244,7 +244,7 @@ def test_a_function_of_more_points_than_a_ramp_holds_is_followed_closely(
     edits = run("edit", tmp_path, stage=layer, representation="volume", overlay=overlay)
     ((_, told),) = edits["told"]
     assert "representation volume" in told
-    assert "opacities" not in told  # nobody touched the ramp
+    assert "opacities" not in told  # the ramp was not edited
 
 
 def test_an_import_has_the_channels_that_the_stage_shows_or_all(
@@ -267,7 +267,7 @@ def test_an_import_has_the_channels_that_the_stage_shows_or_all(
     assert channels_of(channels="ALL") == shown | {F_ID}
 
 
-def test_blocks_have_the_names_that_channels_show(stage_path: Path, tmp_path: Path) -> None:
+def test_objects_and_materials_have_display_names(stage_path: Path, tmp_path: Path) -> None:
     layer, overlay = tmp_path / "over.usda", tmp_path / "edit.usda"
     stage = Usd.Stage.CreateNew(str(layer))
     stage.GetRootLayer().subLayerPaths = [str(stage_path)]
@@ -279,7 +279,7 @@ def test_blocks_have_the_names_that_channels_show(stage_path: Path, tmp_path: Pa
     assert found["meshes"][leaf("r0_c0", F_ID)]["name"] == "CD31/µ 1_r0_c0"
     assert found["meshes"][leaf("r0_c0", BALL_ID)]["name"] == f"{NAMES[1]}_r0_c0"
     assert found["volumes"][leaf("r0_c0", F_ID, "_volume")]["material"] == "CD31/µ 1 volume"
-    # the names of the import are no edits
+    # Names that the import gave are not edits.
     found = run("edit", tmp_path, stage=layer, overlay=overlay, representation="AS_STAGED")
     assert found["told"] == [("Info", "0 edits: ")]
 
@@ -291,8 +291,8 @@ def test_volumes_have_their_grid_place_and_transfer_function(
     assert not found["meshes"]
     assert found["volumes"][leaf("r0_c0", F_ID, "_volume")]["grids"] == ["density"]
     assert all(volume["error"] == "" for volume in found["volumes"].values())
-    # Blender bounds the blocks of 8^3 voxels that are not empty: rows 0 to 47 of the F's 6 to 41
-    # (5.0 bounds the voxels, 4.5 their centres)
+    # Blender's bounds are those of the bricks of 8^3 voxels that are not empty. The F has rows 6 to
+    # 41, so its bricks have rows 0 to 47. Blender 5.0 bounds whole voxels, 4.5 their centres.
     box = found["volumes"][leaf("r0_c0", F_ID, "_volume")]
     assert [box["low"][1], box["high"][1]] == pytest.approx([-47.5 * 0.25, 0.5 * 0.25], abs=0.126)
     assert box["low"][0] == pytest.approx(-0.5 * 0.25, abs=0.126)
@@ -302,7 +302,7 @@ def test_volumes_have_their_grid_place_and_transfer_function(
 
 
 def test_measured_voxels_are_read_to_the_bit(tmp_path: Path) -> None:
-    """By OpenVDB itself: floats in frames of Blosc, indices below 0, a background below 0."""
+    """OpenVDB itself reads floats in Blosc frames, negative indices and a negative background."""
     measured = np.random.default_rng(1).integers(-1024, 60000, (12, 23, 40)).astype(np.float32)
     measured[:, :9] = -1024
     write_vdb(
@@ -326,13 +326,13 @@ def test_cameras_are_a_stereo_pair(stage_path: Path, tmp_path: Path) -> None:
     assert mono["sensor"] == pytest.approx(36)
     assert mono["eyes"] == pytest.approx(right["at"][0] - left["at"][0])
     assert left["shift"] == pytest.approx(-right["shift"])
-    # off-axis: both windows are centred on the same point, at the distance of convergence
+    # Off-axis cameras: both view windows have the same centre at the distance of convergence.
     window = mono["convergence"] * mono["sensor"] / mono["lens"]
     assert left["shift"] * window == pytest.approx(mono["eyes"] / 2, rel=1e-3)
     assert mono["clip"][0] < mono["convergence"] < mono["clip"][1]
 
 
-def test_what_can_not_be_imported_is_one_clear_line(stage_path: Path, tmp_path: Path) -> None:
+def test_an_import_that_fails_gives_one_clear_line(stage_path: Path, tmp_path: Path) -> None:
     text = run("refuse", tmp_path, stage=stage_path, tiles="r9_*")
     assert "no tile fits 'r9_*'; there are r0_c0, r0_c1" in text
     other = tmp_path / "other.usda"
@@ -342,7 +342,7 @@ def test_what_can_not_be_imported_is_one_clear_line(stage_path: Path, tmp_path: 
     )
 
 
-def test_nothing_changed_is_an_empty_layer(stage_path: Path, tmp_path: Path) -> None:
+def test_an_export_without_edits_is_an_empty_layer(stage_path: Path, tmp_path: Path) -> None:
     overlay = tmp_path / "edit.usda"
     found = run(
         "edit", tmp_path, stage=stage_path, overlay=overlay, representation="AS_STAGED", size="TRUE"
@@ -376,7 +376,7 @@ def test_edits_reach_the_bundle(stage_path: Path, tmp_path: Path, size: str) -> 
     (box,) = [tile["bounds_um"] for tile in manifest["tiles"]]
     assert box["min"] == pytest.approx(np.array([0, -11.75, 0]) + offset, rel=1e-4)
     assert letter["tileset"] is not None
-    assert ball["tileset"] is None  # one half deleted, the other in the hidden tile
+    assert ball["tileset"] is None  # one half was deleted, the other is in the hidden tile
     stage = Usd.Stage.Open(str(overlay))
     prim = stage.GetPrimAtPath(f"/Specimen/Channels/{BALL_ID}")
     functions = prim.GetVariantSet("transferFunction")
@@ -393,7 +393,10 @@ LETTER = leaf("r0_c0", F_ID)
 
 
 def mesh_at(layer: Path, path: str, lod: str) -> UsdGeom.Mesh:
-    """Return a mesh of a composed stage in one level of detail; it lives as long as the stage."""
+    """Return a mesh of a composed stage in one level of detail.
+
+    The mesh keeps a reference to the stage, because it is invalid without it.
+    """
     stage = Usd.Stage.Open(str(layer))
     tile = stage.GetPrimAtPath(Sdf.Path(path).GetParentPath().GetParentPath())
     tile.GetVariantSet("lod").SetVariantSelection(lod)
@@ -408,11 +411,11 @@ def array(attribute: Usd.Attribute) -> Any:
 
 @pytest.mark.parametrize("size", ["MICROMETRES", "TRUE"])
 @pytest.mark.parametrize("lod", ["lod0", "lod2"])
-def test_moved_points_are_carried_with_all_that_follows_from_them(
+def test_moved_points_are_carried_with_their_extent_normals_and_tangents(
     stage_path: Path, tmp_path: Path, size: str, lod: str
 ) -> None:
     overlay = tmp_path / "an artist's edit.usda"
-    top = -4.0  # um, of y: the upper strokes of the F
+    top = -4.0  # um; the upper strokes of the F have a larger y
     found = run(
         "edit", tmp_path, stage=stage_path, overlay=overlay, size=size, lod=lod,
         pull={LETTER: [1, top, 1.5]},
@@ -433,11 +436,11 @@ def test_moved_points_are_carried_with_all_that_follows_from_them(
     far = ~np.isin(
         np.arange(len(before)), triangles[(before != after).any(axis=1)[triangles].any(axis=1)]
     )
-    # along a seam of UVs the twin of a touched vertex is touched as well
+    # Along a UV seam, the copies of a changed vertex are changed as well.
     far &= (before[:, 1] < top - 1) | (before[:, 1] > top + 1)
     assert far.any()
     assert np.array_equal(normals[far], kept[far])
-    # a wall that was stretched lies flatter: its normals follow the triangles
+    # Normals of stretched walls follow their triangles.
     stretched = (before[triangles, 1].max(axis=1) > top) & (before[triangles, 1].min(axis=1) <= top)
     corners = after[triangles[stretched]]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -446,7 +449,7 @@ def test_moved_points_are_carried_with_all_that_follows_from_them(
         return float((vectors[triangles[stretched]].mean(axis=1) * facing).sum())
 
     assert agreement(normals) > agreement(kept)
-    if lod == "lod2":  # the level that has them
+    if lod == "lod2":  # only this level has tangents
         tangents = array(UsdGeom.PrimvarsAPI(edited).GetPrimvar("tangents"))
         across = (tangents[:, :3] * normals).sum(axis=1)
         before_it = array(UsdGeom.PrimvarsAPI(built).GetPrimvar("tangents"))[:, :3]
@@ -458,7 +461,7 @@ def test_moved_points_are_carried_with_all_that_follows_from_them(
     )
 
 
-def test_points_that_are_still_in_edit_mode_are_carried(stage_path: Path, tmp_path: Path) -> None:
+def test_points_moved_in_edit_mode_are_carried(stage_path: Path, tmp_path: Path) -> None:
     overlay = tmp_path / "edit.usda"
     run(
         "edit", tmp_path, stage=stage_path, overlay=overlay, lod="lod0", tiles="r0_c0",
@@ -493,7 +496,7 @@ def test_moved_meshes_and_volumes_are_carried(stage_path: Path, tmp_path: Path, 
     assert entries[1]["matrix"][12:] == pytest.approx([0, -4, 0, 1])
 
 
-NAME = f"{NAMES[0]}_r0_c0"  # in Blender
+NAME = f"{NAMES[0]}_r0_c0"  # name of LETTER's object in Blender
 
 
 @pytest.mark.parametrize(
@@ -522,7 +525,7 @@ NAME = f"{NAMES[0]}_r0_c0"  # in Blender
         ("light_by_area", "strength by area of light Bulb is not taken over"),
     ],
 )
-def test_an_edit_that_no_layer_carries_is_named(
+def test_an_edit_that_a_layer_cannot_carry_is_listed_as_lost(
     stage_path: Path, tmp_path: Path, odd: str, words: str
 ) -> None:
     found = run(
@@ -538,7 +541,7 @@ def test_an_edit_that_no_layer_carries_is_named(
 
 
 def additions_of(bundle: Path) -> dict[str, Any]:
-    """Return the meshes of additions.glb as another library reads it, in um, by their paths."""
+    """Return the meshes of additions.glb by their paths, in um, as trimesh reads them."""
     scene = trimesh.load(bundle / "additions.glb")
     return {
         name: scene.geometry[geometry].copy().apply_transform(matrix).apply_scale(1e6)
@@ -548,7 +551,7 @@ def additions_of(bundle: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("size", ["MICROMETRES", "TRUE"])
-def test_what_an_artist_adds_reaches_the_bundle(
+def test_objects_that_an_artist_adds_reach_the_bundle(
     stage_path: Path, tmp_path: Path, size: str
 ) -> None:
     overlay, bundle = tmp_path / "edit.usda", tmp_path / "bundle"
@@ -568,7 +571,7 @@ def test_what_an_artist_adds_reaches_the_bundle(
     assert arrow.visual.material.roughnessFactor == pytest.approx(0.25)
     assert box.bounds == pytest.approx(np.array([(37, -7, 3), (43, -3, 5)]), abs=1e-3)
     outwards = np.einsum("ij,ij->i", box.vertex_normals, box.vertices - (40, -5, 4))
-    assert (outwards > 0).all()  # although its object is mirrored
+    assert (outwards > 0).all()  # although the object is mirrored
     solid = trimesh.Trimesh(box.vertices, box.faces)
     assert solid.volume == pytest.approx(48, rel=1e-3)
     assert label.bounds[0][:2] == pytest.approx([0, 5], abs=0.5)
@@ -587,7 +590,7 @@ def test_what_an_artist_adds_reaches_the_bundle(
     assert lamps["Bulb"]["position_um"] == pytest.approx([20, 95, 4], abs=1e-2)
     middle = np.mean([manifest["specimen"]["bounds_um"][end] for end in ("min", "max")], axis=0)
     distance = np.linalg.norm(middle - (20, 95, 4))
-    # P / (4 pi d^2) on a surface that faces it; a white one sends on 1 / pi of that
+    # A surface that faces the lamp receives P / (4 pi d^2); a white one reflects 1 / pi of that.
     assert lamps["Bulb"]["strength"] == pytest.approx(0.5 * (100 / distance) ** 2, rel=1e-3)
     assert lamps["key"]["strength"] == pytest.approx(1 / np.pi, rel=1e-4)
     glb = next((bundle / "channels" / manifest["channels"][0]["id"]).rglob("*.glb"))
@@ -608,7 +611,7 @@ def test_exposure_temperature_and_colors_above_white_reach_the_bundle(
     (lamp,) = [
         one for one in load(bundle / "manifest.json")["lights"]["lamps"] if "Ev" in one["name"]
     ]
-    # A sun of 2 W/m2 and three stops; a candle's red is far brighter than its blue.
+    # The sun has 2 W/m2 and an exposure of three stops. Its light is as red as that of a candle.
     red, green, blue = lamp["color"]
     assert red == 1
     assert 0.2 < green < 0.6
@@ -639,7 +642,7 @@ def test_additions_of_an_earlier_export_are_moved_and_hidden(
     assert box.bounds == pytest.approx(np.array([(42, -7, 3), (48, -3, 5)]), abs=1e-3)
 
 
-def test_a_copy_of_a_surface_is_an_addition_of_its_color(stage_path: Path, tmp_path: Path) -> None:
+def test_a_copy_of_a_surface_is_an_addition_in_its_color(stage_path: Path, tmp_path: Path) -> None:
     overlay = tmp_path / "edit.usda"
     run("edit", tmp_path, stage=stage_path, overlay=overlay, tiles="r0_c0", odd=["copy"])
     write_bundle(overlay, tmp_path / "bundle", None, engine=Engine(0))
@@ -671,7 +674,7 @@ def test_a_picture_shows_mesh_volume_and_the_new_colour(stage_path: Path, tmp_pa
         assert ball[:, half].sum() > 50
 
 
-def test_its_own_importer_opens_an_exported_gltf(stage_path: Path, tmp_path: Path) -> None:
+def test_blenders_importer_opens_an_exported_gltf(stage_path: Path, tmp_path: Path) -> None:
     for packing in (None, "draco"):
         with forcing(True):
             options = ExportOptions(lod=0, compress=packing)
@@ -680,6 +683,6 @@ def test_its_own_importer_opens_an_exported_gltf(stage_path: Path, tmp_path: Pat
         assert found["parents"] == {f"{name} {tile}": name for name in NAMES[:2] for tile in TILES}
         for name, color in zip(NAMES[:2], COLORS[:2], strict=True):
             assert found["colors"][name] == pytest.approx([*color, 1], abs=1e-6)
-        # the F: 36 voxels of .25 um upright, which is z in Blender
+        # The F is 36 voxels of .25 um high, and z is up in Blender.
         low, high = (np.array(end) * 1e6 for end in found["bounds"])
         assert high[2] - low[2] == pytest.approx(36 * 0.25, rel=0.03)

@@ -1,4 +1,4 @@
-"""The cards that stand for a specimen look as the specimen does, from each side, in Storm."""
+"""USD's preview cards of a specimen look like the specimen itself from each side, in Storm."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ from support.stages import write_whole
 SCRIPT = Path(__file__).with_name("storm.py")
 pytestmark = NEEDS_BLENDER
 
-# to the eye, and up
+# Direction towards the eye, and the camera's up direction
 SIDES = {
     "xpos": ((1, 0, 0), (0, 1, 0)),
     "xneg": ((-1, 0, 0), (0, 1, 0)),
@@ -26,7 +26,7 @@ SIDES = {
     "zpos": ((0, 0, 1), (0, 1, 0)),
     "zneg": ((0, 0, -1), (0, 1, 0)),
 }
-_FAR_UM = 800.0  # so far that the view is almost parallel
+_FAR_UM = 800.0  # distance of the eye; the view is almost parallel
 _WIDTH = 240
 
 
@@ -39,7 +39,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def picture(stage_path: Path, folder: Path, side: str, draw_mode: str) -> np.ndarray:
-    """Return a picture (h, w, 4) of the specimen from a side, by a lamp of the scene."""
+    """Return an image (h, w, 4) of the specimen from one side, lit by a lamp at the camera."""
     scene = folder / f"{draw_mode}.usda"
     stage = Usd.Stage.CreateNew(str(scene))
     stage.GetRootLayer().subLayerPaths.append(str(stage_path))

@@ -1,4 +1,4 @@
-"""After an import by the add-on the scene is ready to be rendered, if no option forbids it."""
+"""After an import by the add-on, the scene is ready for rendering, unless `is_lit` is off."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_scene_has_the_lights_of_the_stage(stage_path: Path, tmp_path: Path) -> None:
     found = run("lighting", tmp_path, stage=stage_path)
-    # USD's normalized intensity is an irradiance, as Blender's strength of a sun
+    # USD's normalized intensity is an irradiance, and so is the strength of a sun in Blender.
     assert found["suns"] == pytest.approx({"key": 0.5, "fill": 0.15})
     assert found["images"] == ["studio.exr"]
     assert found["transform"] == "Standard"

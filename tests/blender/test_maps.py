@@ -1,4 +1,4 @@
-"""Surfaces with baked maps stay closed in Blender, where people sculpt and cut them."""
+"""Surfaces with baked maps stay closed when they are cut and smoothed in Blender."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ _RADIUS_UM = 12.0
 
 @pytest.fixture(scope="module")
 def tile(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The layer of a tile with one ball, whose levels have UVs and maps."""
+    """Return the layer of a tile with one ball, whose levels of detail have UVs and maps."""
     folder = tmp_path_factory.mktemp("maps")
     spacing = (1.0, 1.0, 1.0)
     ball = phantoms.blurred_ball((40, 40, 40), spacing, (20.0, 20.0, 20.0), _RADIUS_UM, 1.0)
@@ -39,5 +39,5 @@ def test_a_box_is_cut_out_of_a_surface_with_maps_and_nothing_tears(
     whole = found["before"]["volume"]
     assert whole == pytest.approx(4 / 3 * np.pi * _RADIUS_UM**3, rel=0.05)
     assert set(found["cut"]["edges"]) == set(found["smoothed"]["edges"]) == {"2"}
-    # The box covers an eighth of the ball, about its corner.
+    # The box has one corner at the ball's centre, so it cuts off an eighth of the ball.
     assert found["cut"]["volume"] == pytest.approx(7 / 8 * whole, rel=0.03)

@@ -1,4 +1,4 @@
-"""Blender's own importer opens a stage in colour, without the add-on."""
+"""Blender's own importer shows a stage with its colours and lights, without the add-on."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The Blender add-on imports each layer that README.md and docs/ print, in its true size."""
+"""The Blender add-on imports each layer that README.md and docs/ print, at the right size."""
 
 from pathlib import Path
 

@@ -1,8 +1,10 @@
-"""A stage and its exports look alike, and right, in the programs that open them.
+"""A stage and its exports look right, and the same, in all programs that open them.
 
-Storm draws by the stage's own lights alone, Blender in its default scene, the add-on as it leaves
-the scene after an import, three.js by the same lights as the stage's, Cesium by its own. A small
-stage is drawn here. `make test-dcc` draws the samples, larger, and writes a contact sheet.
+The programs differ in their lights. Storm and three.js use the stage's lights, and Cesium uses its
+own. Blender is tested in its default scene, and in the scene that the add-on makes.
+
+These tests draw a small stage. `make test-dcc` draws the samples at a larger size and writes a
+contact sheet.
 """
 
 import os
@@ -18,15 +20,16 @@ from support.dcc.pictures import BY_DEFAULT_CAMERA, COLUMNS, EEVEE, VOLUMES, Pic
 from support.dcc.sheet import write_sheet
 from support.stages import write_whole
 
-# The samples: NAME=OUT, separated by spaces. Empty: the letter F of support/stages.py
+# Samples to draw: NAME=OUT, separated by spaces. Without any, the F of support/stages.py is drawn.
 SAMPLES = dict(one.split("=") for one in os.environ.get("STEREOCELL_DCC", "").split())
 SHEET = os.environ.get("STEREOCELL_DCC_SHEET")
-# EEVEE compiles its shaders for a minute, so the small stage is drawn without it
+# The small stage is not drawn with EEVEE, which compiles its shaders for a minute.
 CHOSEN = [one for one in COLUMNS if SAMPLES or one != EEVEE]
 SIZE = (640, 360) if SAMPLES else (240, 135)
-LUMINANCE = (0.15, 0.7)  # of encoded values from 0 to 1
-# A .glb brings no light. Blender's default lamp leaves fronts in the shade: its own grey cube has a
-# luminance of .20 from the front, and .43 from the default camera, by which a .glb is judged
+LUMINANCE = (0.15, 0.7)  # 0..1; allowed range of the mean of encoded values
+# The luminance of this column is not checked. A .glb has no light, and the front is in the shade of
+# Blender's default lamp. Blender's own grey cube has a luminance of .20 from the front and .43 from
+# the default camera. A .glb's luminance is therefore checked in the view of the default camera.
 UNLIT = "Blender, glb"
 HUE_DEGREES = 10
 OVERLAP = 0.95
@@ -41,7 +44,7 @@ Pictures = dict[str, Picture]
 
 @pytest.fixture(scope="module")
 def drawn() -> Iterator[dict[str, Pictures]]:
-    """Pictures of each sample; their contact sheet is written at the end."""
+    """Yield a dictionary for the images of each sample; write the contact sheet at the end."""
     samples: dict[str, Pictures] = {}
     yield samples
     if SHEET:
@@ -67,7 +70,7 @@ def pictures(
 def test_the_specimen_is_neither_dark_nor_overexposed(pictures: Pictures, column: str) -> None:
     found = pictures[column].measures
     assert LUMINANCE[0] <= found.luminance <= LUMINANCE[1]
-    assert found.white < 0.02  # no more than highlights
+    assert found.white < 0.02  # only highlights may be white
 
 
 @pytest.mark.parametrize("column", CHOSEN)
@@ -77,16 +80,17 @@ def test_each_channel_has_the_hue_of_its_colour(pictures: Pictures, column: str)
 
 
 def test_three_draws_in_the_light_of_the_stage_as_storm_does(pictures: Pictures) -> None:
-    """Materials and lights mean the same to both."""
+    """Both programs interpret materials and lights in the same way."""
     storm, three = (pictures[column].measures for column in ("Storm, stage", "three, glb"))
     assert three.luminance == pytest.approx(storm.luminance, abs=0.04)
 
 
 def test_all_programs_draw_the_same_silhouette(pictures: Pictures) -> None:
-    """Volumes are left out: their haze, below the surface's level, reaches past the bodies.
+    """All columns of surfaces overlap; volumes are not compared.
 
-    Where there is none, they fit at an alpha of 0.1: .97 of the sample cycif, .99 of mri. In sparse
-    cells of a light sheet, haze covers as much again as the cells do: .62 of brain-cells.
+    Volumes also show haze: voxels below the level of the surface, which reach beyond it. Volumes
+    with little haze overlap the surfaces at an alpha of 0.1: .97 for the sample cycif, .99 for mri.
+    In brain-cells, haze covers as much area as the sparse cells do, and the overlap is .62.
     """
     surfaces = [column for column in CHOSEN if column not in (VOLUMES, BY_DEFAULT_CAMERA)]
     for column in surfaces:

@@ -1,6 +1,6 @@
-"""Storm, the renderer that ships with USD, draws the stage by the stage's own lights.
+"""Storm, the renderer that ships with USD, draws the stage lit by the stage's own lights.
 
-`make test-blender` runs it: Blender's Python has USD with Storm. See blender/storm.py.
+`make test-blender` runs these tests: Blender's Python has USD with Storm. See blender/storm.py.
 """
 
 import os
@@ -25,7 +25,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def draw(stage: Path, picture: Path) -> NDArray[np.float64]:
-    """Return the pixels that the specimen covers, sRGB from 0 to 1, (n, 3)."""
+    """Return the pixels (n, 3) that the specimen covers, sRGB from 0 to 1."""
     command = [PYTHON, SCRIPT, stage, "/Specimen/Cameras/mono", picture, "320"]
     drawn = subprocess.run(command, capture_output=True, text=True, timeout=120)
     if drawn.returncode and "EGL" in drawn.stderr and not os.environ.get("CI"):
@@ -46,18 +46,18 @@ def luminance(pixels: NDArray[np.float64]) -> float:
     return float((pixels @ [0.2126, 0.7152, 0.0722]).mean())
 
 
-def test_the_specimen_is_neither_black_nor_white_by_its_own_lights(
+def test_the_specimen_is_neither_black_nor_white_in_its_own_lights(
     stage_path: Path, tmp_path: Path
 ) -> None:
     lit = draw(stage_path, tmp_path / "lit.png")
     assert 0.15 < luminance(lit) < 0.7
-    assert (lit >= 1).all(axis=1).mean() < 0.01  # no more than highlights are white
+    assert (lit >= 1).all(axis=1).mean() < 0.01  # only highlights are white
     dark = edit(stage_path, tmp_path / "dark.usda", 'over "Lights" (active = false)\n{\n}')
     assert luminance(draw(dark, tmp_path / "dark.png")) < 0.05
 
 
 def test_an_edited_channel_is_drawn_in_its_new_colour(stage_path: Path, tmp_path: Path) -> None:
-    """An artist edits the interface of one material, and sees all tiles change."""
+    """An edit of one material's interface changes the colour in all tiles."""
     color = f'over "{F_ID}"\n{{\ncolor3f inputs:color = (0.05, 0.8, 0.1)\n}}'
     layer = edit(stage_path, tmp_path / "e.usda", f'over "Channels"\n{{\n{color}\n}}')
     before, after = draw(stage_path, tmp_path / "a.png"), draw(layer, tmp_path / "b.png")

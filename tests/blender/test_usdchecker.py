@@ -1,4 +1,4 @@
-"""The checks of `usdchecker` find no fault in a stage; Blender's USD has them, usd-core has not."""
+"""The checks of `usdchecker` find no fault in a stage. Blender's USD has them; usd-core has not."""
 
 from pathlib import Path
 

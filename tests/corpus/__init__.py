@@ -1,7 +1,8 @@
-"""Volumes with a truth: drawn by a person, given by physics, or made; and volumes of nothing.
+"""The corpus: volumes with a known truth, and empty volumes.
 
-What levels for a surface are chosen by, and held to. A part is held out: it takes no part where a
-constant is chosen.
+A truth is drawn by a person, follows from physics, or is made by a script. The corpus is used to
+choose and to check the method that finds iso-values. Some cases are held out: no constant is chosen
+on them.
 """
 
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from corpus.real import real_cases
 
 
 def all_cases() -> Iterator[Case]:
-    """Yield every case; the real ones where STEREOCELL_DATA names their folder."""
+    """Yield every case; real volumes only if STEREOCELL_DATA names their folder."""
     yield from real_cases()
     yield from made_cases()
     yield from family_cases()

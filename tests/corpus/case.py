@@ -1,4 +1,4 @@
-"""One volume of the corpus: how it is loaded, and what is true of it."""
+"""One volume of the corpus, with its truth."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,17 +16,18 @@ Kind = Literal["microscopy", "CT", "MR"]
 class Case:
     """A volume of one channel.
 
-    group       labelled: a person or a model marked each voxel; outlined: physics or a plain
-                threshold says where the outside ends; made: by script; nested: by script too,
-                bodies within bodies; empty: nothing is there; looked at: nobody says what is
-                there, so that only methods can be compared
-    spacing_um  (z, y, x)
-    load        returns the voxels (z, y, x) and the truth, bool (z, y, x); None: nothing
-                is there, or nobody says what
-    grid        rows and columns of the tiles it is cut into
-    held_out    whether it was kept from all choosing of constants
-    rung        which surface the truth is of: 0 the outer, 1 the next one within it
-    source      who made the volume; volumes of one source are held out together
+    group       labelled: a person or a model marked each voxel; outlined: the boundary follows
+                from physics or a plain threshold; made: made by a script; nested: made by a
+                script, objects within objects; empty: without a specimen; looked at: without a
+                known truth, so that methods can only be compared with each other
+    spacing_um  voxel spacing (z, y, x)
+    load        returns the voxels (z, y, x) and the truth, bool (z, y, x); the truth is None if
+                the volume is empty or the truth is unknown
+    grid        rows and columns of the tiles that the volume is cut into
+    held_out    whether no constant was chosen on this volume
+    rung        level of the surface that the truth belongs to: 0 is the outer one, 1 the next one
+                inside it
+    source      origin of the volume; volumes of one source are held out together
     """
 
     name: str

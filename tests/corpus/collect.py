@@ -2,10 +2,13 @@
 
     python tests/corpus/collect.py CLONES OUT
 
-CLONES holds a clone of each repository of the table below, in folders OWNER/NAME, and in the folder
-napari-cellseg3d the unpacked wheel of that package. OUT is `level_corpus` in the folder that
-STEREOCELL_DATA names. A truth is a label map of the source, the steepest slope by a watershed from
-two markers, what stands out from the noise of the air, or the Hounsfield units of skin.
+CLONES is a folder with a clone of each repository in the table below, in folders OWNER/NAME. Its
+folder napari-cellseg3d has the unpacked wheel of that package. OUT is `level_corpus` in the folder
+that STEREOCELL_DATA names.
+
+A truth is found in one of four ways. It is a label map that belongs to the volume, a watershed of
+the slope from two markers, the voxels far above the noise of the air, or the voxels above the
+Hounsfield units of skin.
 """
 
 import argparse
@@ -33,7 +36,7 @@ NEUBIAS = "NEUBIAS/training-resources/image_data"  # CC BY 4.0
 IMAGEIO = "imageio/imageio-binaries/images"  # no licence is stated
 CELLSEG = "napari-cellseg3d/examples"  # MIT
 
-# file, the first 16 digits of its SHA-256
+# Path of each file, and the first 16 digits of its SHA-256
 FILES = {
     "ct_trunk": (f"{TOTAL}/example_ct_sm.nii.gz", "e50c00b2914e2cac"),
     "ct_trunk_labels": (f"{TOTAL}/example_seg.nii.gz", "8be652475a4aaae8"),
@@ -60,17 +63,17 @@ FILES = {
     "ct_stent": (f"{IMAGEIO}/stent.npz", "60a83d2296b51ee6"),
     "nuclei_cleared_brain": (f"{CELLSEG}/c5image.tif", "9bb5a3da2ade6f66"),
 }
-BONES = ((25, 50), (69, 78), (91, 116))  # labels of bones, from and to, in TotalSegmentator's map
+BONES = ((25, 50), (69, 78), (91, 116))  # first and last labels of bones in TotalSegmentator's map
 
 
 class Clones:
-    """The files of the sources, each checked before it is read."""
+    """Reads files from the clones; each file's hash is checked first."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
     def path(self, name: str) -> Path:
-        """Return a file's path. Exits where it is missing, or is another version."""
+        """Return the path of a file. Raises SystemExit if it is missing or has another hash."""
         place, digits = FILES[name]
         path = self._folder / place
         if not path.is_file():
@@ -81,13 +84,13 @@ class Clones:
         return path
 
     def scan(self, name: str) -> tuple[NDArray[Any], Spacing]:
-        """Return voxels (z, y, x) of a medical image and its spacing, um."""
+        """Return the voxels (z, y, x) of a medical image, and its voxel spacing (z, y, x) in um."""
         image = SimpleITK.ReadImage(str(self.path(name)))
         x, y, z = (1000.0 * float(side) for side in image.GetSpacing())
         return SimpleITK.GetArrayFromImage(image), (z, y, x)
 
     def stack(self, name: str) -> NDArray[Any]:
-        """Return voxels of a TIFF, as they are stored."""
+        """Return the voxels of a TIFF in their stored order."""
         return tifffile.imread(self.path(name))
 
 
@@ -101,12 +104,13 @@ def steepest(
     fills: bool = False,
     least: int = 0,
 ) -> NDArray[np.bool_]:
-    """Return what a watershed of the slope gives to the markers above `bright`.
+    """Return the mask (z, y, x) of objects from a watershed of the slope.
 
-    dark   voxels below it are markers of the ground
-    sigma  of a Gaussian before, in finest spacings
-    fills  whether holes in the planes are closed
-    least  voxels of a piece that is kept
+    dark    voxels below this value are markers of the background
+    bright  voxels above this value are markers of the objects
+    sigma   sigma of a Gaussian filter that is applied first, in units of the finest spacing
+    fills   whether holes in the z planes are filled
+    least   smallest connected component that is kept, in voxels
     """
     sigmas = [sigma * min(spacing) / side for side in spacing]
     smooth = ndimage.gaussian_filter(voxels.astype(np.float32), sigmas)
@@ -125,7 +129,10 @@ def steepest(
 
 
 def out_of_air(voxels: NDArray[Any], side: int = 12) -> NDArray[np.bool_]:
-    """Return what stands ten deviations above the air in the four edges of a stack."""
+    """Return the mask of voxels more than ten standard deviations above the air.
+
+    The air is measured in the four edges of the stack along z, `side` voxels wide.
+    """
     smooth = ndimage.gaussian_filter(voxels.astype(np.float32), 0.7)
     ends = (slice(0, side), slice(-side, None))
     air = np.concatenate([smooth[:, y, x].ravel() for y in ends for x in ends])
@@ -133,7 +140,7 @@ def out_of_air(voxels: NDArray[Any], side: int = 12) -> NDArray[np.bool_]:
 
 
 def skin(hounsfield: NDArray[Any]) -> NDArray[np.bool_]:
-    """Return the body of a CT by the value of skin."""
+    """Return the mask of the patient's body in a CT: values above -300 HU."""
     return np.asarray(ndimage.median_filter(hounsfield, 3) > -300)
 
 
@@ -185,7 +192,7 @@ def _other(clones: Clones) -> Iterator[Made]:
     yield "nuclear_envelopes", clones.stack("nuclear_envelopes"), None, spacing
 
 
-# name, spacing in um, then the arguments of `steepest`
+# Name, voxel spacing in um, and the other arguments of `steepest`
 _OUTLINED: tuple[tuple[str, Spacing, float, float, dict[str, Any]], ...] = (
     ("nuclei_teaching", (1.0, 0.5, 0.5), 12, 70, {"least": 60}),
     ("chromosomes", (0.5, 0.2, 0.2), 124, 140, {"sigma": 2.5, "least": 300}),
@@ -198,7 +205,7 @@ _OUTLINED: tuple[tuple[str, Spacing, float, float, dict[str, Any]], ...] = (
 def _outlined(clones: Clones) -> Iterator[Made]:
     for name, spacing, dark, bright, options in _OUTLINED:
         voxels = clones.stack(name)
-        if name == "chromosomes":  # stored with more bits than it has values
+        if name == "chromosomes":  # stored with more bits than its values need
             voxels = voxels.astype(np.uint8)
         yield name, voxels, steepest(voxels, spacing, dark, bright, **options), spacing
 

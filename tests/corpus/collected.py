@@ -1,7 +1,8 @@
-"""Small volumes of sources that no constant was chosen on; their truth is another method's.
+"""Small public volumes on which no constant was chosen; their truths come from other methods.
 
-They lie in the folder `level_corpus` of STEREOCELL_DATA, one NPZ each: `voxels` (z, y, x), `truth`
-(bool; empty: nobody marked it), `spacing_um`. collect.py makes them, and names sources and truths.
+They lie in the folder `level_corpus` of STEREOCELL_DATA. Each is an NPZ file with `voxels`
+(z, y, x), `truth` (bool; an empty array if it is unknown) and `spacing_um`. The files are made by
+collect.py, which documents their sources and truths.
 """
 
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from corpus.case import Case, Group, Kind, Mask
 
-# name, source, modality, how the truth was found, which surface it is of
+# Name, source, kind, group, and the level of the surface that the truth belongs to (0 is the outer)
 _TABLE: tuple[tuple[str, str, Kind, Group, int], ...] = (
     ("ct_trunk", "TotalSegmentator", "CT", "outlined", 0),
     ("ct_trunk_bone", "TotalSegmentator", "CT", "labelled", 1),
@@ -44,7 +45,7 @@ _TABLE: tuple[tuple[str, str, Kind, Group, int], ...] = (
 
 
 def collected_cases(folder: Path) -> Iterator[Case]:
-    """Yield the volumes that the folder has; `missing` names the others."""
+    """Yield the volumes that the folder has. `missing` lists the other names."""
     for name, source, kind, group, rung in _TABLE:
         path = folder / f"{name}.npz"
         if not path.is_file():

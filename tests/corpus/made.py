@@ -1,4 +1,4 @@
-"""Volumes made by script: bodies under the faults of cameras and stages, and fields of nothing."""
+"""Volumes made by script: objects with the faults of cameras and stages, and empty fields."""
 
 import zlib
 from collections.abc import Callable, Iterator
@@ -22,16 +22,16 @@ Field = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Camera:
-    """How photons become numbers."""
+    """A model of a camera, which converts photons to voxel values."""
 
     gain: float
     offset: float
     read_noise: float  # electrons
-    excess: float = 1.0  # factor on the variance of counting
+    excess: float = 1.0  # factor on the variance of the photon count
     largest: int = 65535
 
     def shoot(self, photons: Field, rng: np.random.Generator) -> NDArray[np.uint16]:
-        """Return numbers for mean photons (z, y, x)."""
+        """Return voxel values for mean photon counts (z, y, x)."""
         counted = rng.poisson(np.maximum(photons, 0) / self.excess) * self.excess
         electrons = counted + rng.normal(0, self.read_noise, photons.shape)
         return np.clip(np.rint(electrons * self.gain + self.offset), 0, self.largest).astype(
@@ -56,7 +56,7 @@ def _axes() -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
 
 
 def _balls(rng: np.random.Generator, count: int, radius: tuple[float, float]) -> Mask:
-    """Return balls with radii in um, none beyond the volume."""
+    """Return a mask of balls inside the volume; `radius` is the range of radii in um."""
     z, y, x = _axes()
     mask = np.zeros(SHAPE, bool)
     for _ in range(count):
@@ -67,19 +67,22 @@ def _balls(rng: np.random.Generator, count: int, radius: tuple[float, float]) ->
 
 
 def _seen(mask: Mask, height: Field | float, background: Field | float) -> Field:
-    """Return mean photons: bodies of a height over a background, blurred."""
+    """Return mean photon counts: objects of a given height, blurred, plus a background."""
     field = np.where(mask, height, 0.0).astype(np.float64)
     return np.asarray(ndimage.gaussian_filter(field, BLUR) + background, np.float64)
 
 
 def _texture(rng: np.random.Generator, sigma: float) -> Field:
-    """Return a smooth random field of mean 0 and deviation 1; sigma in voxels in plane."""
+    """Return a smooth random field with mean 0 and standard deviation 1.
+
+    `sigma` is the sigma of the Gaussian filter within the z planes, in voxels; along z it is half.
+    """
     field = ndimage.gaussian_filter(rng.normal(size=SHAPE), (sigma / 2, sigma, sigma))
     return np.asarray((field - field.mean()) / field.std(), np.float64)
 
 
 def _empty(camera: str, fault: str) -> NDArray[np.uint16]:
-    """Return a tile without tissue, as a camera sees it."""
+    """Return a tile without tissue, with one fault of the camera or the stage."""
     rng = _rng(f"empty {camera} {fault}")
     photons = np.full(SHAPE, 3.0)
     if fault == "vignetting":
@@ -112,19 +115,19 @@ HARD_LIGHTS = ("depth x 10", "depth x 28", "stripes", "tissue x 4")
 
 
 def _uneven_light(camera: str, light: str) -> NDArray[np.uint16]:
-    """Return a tile of nothing but a ground that the light makes uneven."""
+    """Return a tile with only a background, under uneven light."""
     z, _, x = _axes()
     kind, _, factor = light.split()
     along = x / x.max() if kind == "ramp" else z / z.max()
     times, sees = float(factor), CAMERAS[camera]
-    dark = min(40.0, 0.2 * sees.largest / sees.gain)  # so that the bright end isn't saturated
+    dark = min(40.0, 0.2 * sees.largest / sees.gain)  # photons; low enough not to saturate
     photons = dark * (1 + (times - 1) * along if kind == "ramp" else times ** (1 - along))
     whole = np.broadcast_to(photons, SHAPE).astype(np.float64)
     return sees.shoot(whole, _rng(f"light {camera} {light}"))
 
 
 def _hard_light(camera: str, light: str) -> NDArray[np.uint16]:
-    """Return a tile of nothing under light that makes levels look clear."""
+    """Return an empty tile under uneven light that makes a wrong level look clear."""
     z, y, _ = (axis / axis.max() for axis in _axes())
     sees, rng = CAMERAS[camera], _rng(f"hard light {camera} {light}")
     most = min(100.0, 0.25 * sees.largest / sees.gain)  # photons
@@ -138,7 +141,7 @@ def _hard_light(camera: str, light: str) -> NDArray[np.uint16]:
 
 
 def _bodies_in_depth() -> tuple[NDArray[np.uint16], Mask]:
-    """Bodies on a weak ground, in light that falls off to a sixth with depth."""
+    """Objects on a weak background, in light that falls to a sixth with depth."""
     rng = _rng("bodies in depth")
     mask = _balls(rng, 45, (1.0, 1.8))
     z, _, _ = _axes()
@@ -146,7 +149,7 @@ def _bodies_in_depth() -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _slab() -> tuple[NDArray[np.uint16], Mask]:
-    """A section of tissue that fills the field, between empty planes."""
+    """A section of tissue that fills the field of view, between empty planes."""
     rng = _rng("slab")
     z, y, x = _axes()
     mask = np.abs(z - 6.7 - 0.4 * np.sin(x / 4) - 0.4 * np.cos(y / 5)) < 3.5
@@ -155,18 +158,18 @@ def _slab() -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _counted(photons: float) -> NDArray[np.uint8]:
-    """Return an empty tile of a detector that counts photons, most voxels without one."""
+    """Return an empty tile of a detector that counts single photons; `photons` is their mean."""
     return _rng(f"counted {photons}").poisson(photons, SHAPE).astype(np.uint8)
 
 
 def _clipped(offset: float) -> NDArray[np.uint8]:
-    """Return an empty tile of a detector whose offset is set so low that most of it reads 0."""
+    """Return an empty tile of a detector whose offset is so low that most voxels are 0."""
     noise = _rng(f"clipped {offset}").normal(offset, 12.0, SHAPE)
     return np.clip(np.rint(noise), 0, 255).astype(np.uint8)
 
 
 def _straight_edge(degrees: float) -> tuple[NDArray[np.uint16], Mask]:
-    """A piece of tissue whose edge was cut straight, nearly along an axis."""
+    """A piece of tissue with a straight edge, at an angle of `degrees` to the y axis."""
     rng = _rng(f"edge {degrees}")
     z, y, x = _axes()
     mask = np.broadcast_to(x < 11 + np.tan(np.radians(degrees)) * (y - 11) + 0 * z, SHAPE).copy()
@@ -175,7 +178,7 @@ def _straight_edge(degrees: float) -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _inside_tissue(camera: str, sigma: float) -> NDArray[np.uint16]:
-    """Return a tile wholly inside tissue: soft texture, no boundary anywhere."""
+    """Return a tile inside tissue: soft texture without any boundary."""
     rng = _rng(f"inside {camera} {sigma}")
     return CAMERAS[camera].shoot(40 * np.exp(0.12 * _texture(rng, sigma)), rng)
 
@@ -197,7 +200,7 @@ def _blob() -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _steep_background() -> tuple[NDArray[np.uint16], Mask]:
-    """Bodies on a ground that rises to three times their own height."""
+    """Objects on a background that rises to three times their own height."""
     rng = _rng("steep")
     mask = _balls(rng, 45, (1.0, 1.8))
     _, _, x = _axes()
@@ -206,7 +209,7 @@ def _steep_background() -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _saturated() -> tuple[NDArray[np.uint16], Mask]:
-    """Bodies that drive the detector to its end."""
+    """Objects that saturate the detector."""
     rng = _rng("saturated")
     mask = _balls(rng, 45, (1.0, 1.8))
     camera = Camera(gain=40.0, offset=100, read_noise=1.6, largest=4095)
@@ -215,7 +218,7 @@ def _saturated() -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _eight_bit() -> tuple[NDArray[np.uint8], Mask]:
-    """A confocal's 8 bits, most of the ground at 0."""
+    """An 8-bit confocal stack, in which most of the background is 0."""
     rng = _rng("eight bit")
     mask = _balls(rng, 45, (1.0, 1.8))
     voxels = CAMERAS["detector"].shoot(_seen(mask, 18.0, 0.6), rng)
@@ -223,7 +226,7 @@ def _eight_bit() -> tuple[NDArray[np.uint8], Mask]:
 
 
 def _stitched() -> tuple[NDArray[np.uint16], Mask]:
-    """Two fields of view side by side, one taken with 1.6 times the light."""
+    """Two fields of view side by side, one of them with 1.6 times the light."""
     rng = _rng("stitched")
     mask = _balls(rng, 45, (1.0, 1.8))
     light = np.where(np.arange(SHAPE[2]) < SHAPE[2] // 2, 1.0, 1.6)[None, None]
@@ -231,7 +234,7 @@ def _stitched() -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _tissue(share_of_light: float) -> tuple[NDArray[np.uint16], Mask]:
-    """A piece of tissue with a rim, texture inside, weak autofluorescence outside."""
+    """A piece of tissue with a wavy rim, texture inside, and weak autofluorescence outside."""
     rng = _rng(f"tissue {share_of_light}")
     z, y, x = _axes()
     rim = 11 + 2.5 * np.sin(y / 3) + 1.5 * np.cos(z / 2)
@@ -241,7 +244,7 @@ def _tissue(share_of_light: float) -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _shells() -> tuple[NDArray[np.uint16], Mask]:
-    """Membranes a voxel and a half thick round touching cells."""
+    """Membranes between touching cells, one and a half voxels thick."""
     rng = _rng("shells")
     seeds = rng.uniform(0, 1, (60, 3)) * (np.array(SHAPE) * SPACING)
     z, y, x = _axes()
@@ -256,7 +259,7 @@ def _shells() -> tuple[NDArray[np.uint16], Mask]:
 
 
 def _nested(photons: float, times: float) -> tuple[NDArray[np.uint16], Mask]:
-    """Cells with nuclei `times` as bright as they are; the truth is the nuclei."""
+    """Cells whose nuclei are `times` as bright as the cells; the truth is the nuclei."""
     rng = _rng(f"nested {photons} {times}")
     z, y, x = _axes()
     cells, nuclei = np.zeros(SHAPE, bool), np.zeros(SHAPE, bool)
@@ -271,7 +274,7 @@ def _nested(photons: float, times: float) -> tuple[NDArray[np.uint16], Mask]:
 
 
 def nested_cases() -> Iterator[Case]:
-    """Yield cells with nuclei, whose level is the second; every other one is held out."""
+    """Yield cells with nuclei. The truth is the second level; every other case is held out."""
     for count, (photons, times) in enumerate(product((10.0, 40.0, 160.0), (1.5, 2.5, 5.0))):
         yield Case(
             f"nested, {photons:g} photons, x {times:g}",
@@ -288,7 +291,7 @@ def _case_of(name: str, make: Callable[[], tuple[NDArray[Any], Mask]], held_out:
 
 
 def made_cases() -> Iterator[Case]:
-    """Yield the volumes with bodies."""
+    """Yield the volumes with objects."""
     for name, make, held_out in (
         ("two classes", _two_classes, False),
         ("one blob", _blob, False),
@@ -308,7 +311,7 @@ def made_cases() -> Iterator[Case]:
 
 
 def family_cases() -> Iterator[Case]:
-    """Yield a third of the family of balls, tubes and membranes, and a third that is held out."""
+    """Yield two thirds of the family of balls, tubes and membranes; half of them are held out."""
     for number, member in enumerate(iso_value_family.family()):
         if number % 3 == 2:
             continue
@@ -325,7 +328,7 @@ def family_cases() -> Iterator[Case]:
 
 
 def empty_cases() -> Iterator[Case]:
-    """Yield the volumes of nothing; every other one is held out."""
+    """Yield the volumes without a surface to find; every other one is held out."""
     makers: dict[str, Callable[[], NDArray[Any]]] = {
         f"empty, counted photons, {photons:g}": partial(_counted, photons)
         for photons in (0.05, 0.3, 3.0)

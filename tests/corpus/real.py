@@ -1,4 +1,4 @@
-"""Volumes from instruments; each is read from the folder that STEREOCELL_DATA names."""
+"""Volumes from instruments, in the folder that STEREOCELL_DATA names."""
 
 import os
 from collections.abc import Iterator
@@ -17,17 +17,17 @@ from stereocell.model.tiling import Box
 from stereocell.read.open_dataset import open as open_dataset
 
 SKIN_HU, BONE_HU = -300.0, 300.0
-_CT_SPACING = (488.28, 4002.45, 488.28)  # as the reader turns it: slices lie along y
+_CT_SPACING = (488.28, 4002.45, 488.28)  # um; the reader turns the series, so slices lie along y
 
 
 def data_folder() -> Path | None:
-    """Return the folder of real volumes; None where there is none."""
+    """Return the folder of real volumes; None if STEREOCELL_DATA does not name a folder."""
     named = os.environ.get("STEREOCELL_DATA")
     return Path(named) if named and Path(named).is_dir() else None
 
 
 def real_cases() -> Iterator[Case]:
-    """Yield the real volumes that are at hand."""
+    """Yield the real volumes; none if there is no folder of them."""
     folder = data_folder()
     if folder is None:
         return
@@ -71,7 +71,7 @@ def _ovule(folder: Path) -> tuple[NDArray[Any], Mask]:
 
     with h5py.File(folder / "ovule_plantseg/sample_ovule.h5") as file:
         image, label = file["raw"][:], file["label"][:]
-    # walls look four voxels wide: two on each side of where cells meet
+    # In the image, walls are four voxels wide: two on each side of the boundary between cells.
     walls = find_boundaries(label, connectivity=1, mode="thick")
     return image, np.asarray(ndimage.binary_dilation(walls))
 
@@ -82,7 +82,7 @@ def _series(folder: Path) -> NDArray[Any]:
 
 
 def _ct(folder: Path, hu: float) -> tuple[NDArray[Any], Mask]:
-    """By physics: what attenuates more than fat or air does, or as bone does."""
+    """Return the CT, and its voxels above `hu` Hounsfield units: the value of skin, or of bone."""
     voxels = _series(folder / "ct_head_ge")
     return voxels, ndimage.median_filter(voxels, (1, 3, 3)) > hu
 
@@ -98,13 +98,13 @@ def _mouse(folder: Path) -> tuple[NDArray[Any], Mask]:
 
 
 def _sheet(folder: Path, channel: int) -> NDArray[Any]:
-    """Of labelled cells in a mouse's brain, and of the tissue itself: no one has marked either."""
+    """Return one channel of a mouse brain: labelled cells or autofluorescence, without a truth."""
     voxels = tifffile.imread(next((folder / "brain_cells_2ch").glob("*.tif")))
     return np.ascontiguousarray(voxels[:, channel])
 
 
 def _above_air(voxels: NDArray[Any]) -> Mask:
-    """What is brighter than the air in the volume's corners by ten of its deviations."""
+    """Return the voxels more than ten standard deviations above the air in the volume's corners."""
     smooth = ndimage.gaussian_filter(voxels.astype(np.float32), 0.7)
     corners = np.concatenate([smooth[z, y, x].ravel() for z in _ENDS for y in _ENDS for x in _ENDS])
     return np.asarray(smooth > np.median(corners) + 10 * max(float(corners.std()), 1.0))

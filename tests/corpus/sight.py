@@ -1,4 +1,4 @@
-"""A case as the product sees it: the denoised field, the evidence of its tiles, its levels."""
+"""Run the product's search for iso-values on a case."""
 
 from dataclasses import dataclass
 from itertools import pairwise, product
@@ -30,12 +30,13 @@ from stereocell.model.volume import Volume
 
 @dataclass(frozen=True)
 class Sight:
-    """One case.
+    """The fields, evidence and levels that the product finds for one case.
 
-    field       smoothed, float32 (z, y, x), which levels are found on
-    above       the same above the background; `field` where there is none
-    values      the field that a surface is extracted from, above the background if levels are
-    tiles       each tile's place and evidence
+    field    denoised voxels, float32 (z, y, x), on which levels are found
+    above    `field` minus the background; `field` itself if no background is estimated
+    values   voxels from which a surface is extracted; minus the background if the levels are
+    padding  voxels that are padding
+    tiles    window and evidence of each tile
     """
 
     case: Case
@@ -50,7 +51,7 @@ class Sight:
 
 
 def look_at(case: Case) -> Sight:
-    """Return a case with its levels."""
+    """Return the fields, evidence and levels of a case."""
     voxels, truth = case.load()
     sigma = min(case.spacing_um)
     axis = find_slice_axis(0, case.spacing_um)
@@ -111,7 +112,7 @@ def _places(shape: tuple[int, ...], grid: tuple[int, int]) -> list[Slices]:
 
 
 def _with_halo(place: Slices, shape: tuple[int, ...]) -> tuple[Slices, Slices]:
-    """Return the window around a tile, and the tile in the window."""
+    """Return the window of a tile with its halo, and the slices of the tile inside the window."""
     sides = [
         (max(s.start - halo, 0), min(s.stop + halo, n))
         for s, halo, n in zip(place, HALO, shape, strict=True)

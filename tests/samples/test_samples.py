@@ -1,4 +1,4 @@
-"""The stated properties of the samples, measured on their voxels."""
+"""The samples have the properties that their documentation states, measured on their voxels."""
 
 import json
 import math
@@ -72,7 +72,9 @@ def test_cycif_repeats_to_the_byte(cycif: Path, tmp_path: Path) -> None:
     assert digests_of(tmp_path / "other.ome.zarr") != digests_of(cycif)
 
 
-def test_cycif_again_is_a_no_op_and_anything_else_stays(cycif: Path, tmp_path: Path) -> None:
+def test_cycif_written_twice_changes_nothing_and_other_files_stay(
+    cycif: Path, tmp_path: Path
+) -> None:
     before = digests_of(cycif.parent)
     times = {file: file.stat().st_mtime_ns for file in cycif.parent.rglob("*")}
     write_cycif(cycif, **SMALL)
@@ -129,7 +131,7 @@ def test_cycif_on_a_full_disk_is_one_line_and_leaves_nothing(
 
 
 @pytest.mark.slow
-def test_sample_that_lost_chunks_is_made_again_and_a_damaged_one_is_named(
+def test_sample_with_missing_chunks_is_made_again_and_a_damaged_one_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "block.ome.zarr"
@@ -164,11 +166,11 @@ def test_wrong_arguments_are_named(tmp_path: Path, change: Any, message: str) ->
         write_cycif(tmp_path / "block.tif", **SMALL)
 
 
-# The truth against the voxels
+# Comparisons of the truth with the voxels
 
 
 @pytest.mark.slow
-def test_voxels_hold_the_boundary_intensity_at_the_nuclei_s_surface() -> None:
+def test_voxels_have_the_boundary_intensity_at_the_surface_of_nuclei() -> None:
     box = Box((0, 0, 0), (64, 200, 360))
     size_um = tuple(n * h for n, h in zip(box.shape, SPACING_UM, strict=True))
     tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed=1, brightness_spread=0.0)
@@ -181,19 +183,19 @@ def test_voxels_hold_the_boundary_intensity_at_the_nuclei_s_surface() -> None:
         assert nucleus.brightness == 1.0
         center, margin = np.array(nucleus.center_um), nucleus.reach_um + 0.5
         if np.any(center < margin) or np.any(center > np.array(size_um) - margin):
-            continue  # cut by the block's faces
+            continue  # the block's faces cut this nucleus
         surface = center + (directions * nucleus.semi_axes_um) @ nucleus.rotation.T
         found = ndimage.map_coordinates(voxels, (surface / SPACING_UM).T, order=1)
         z, y, x = surface.T
         expected = microscope.background(STAINS[0], waves, (z, y, x)) + STAINS[0].amplitude / 2
         errors.append(found.mean() / expected.mean() - 1.0)
     assert len(errors) >= 8
-    # A blurred convex body is a little dimmer at its edge than half way.
+    # After blurring, the edge of a convex object is slightly dimmer than half of its inside.
     assert -0.08 < np.mean(errors) < 0.01
     assert np.abs(errors).max() < 0.15
 
 
-def test_the_truth_equals_the_drawn_bodies(cycif: Path) -> None:
+def test_the_truth_lists_the_nuclei_and_vessels_that_were_drawn(cycif: Path) -> None:
     truth = truth_of(cycif)
     size_um = tuple(n * h for n, h in zip(truth["shape"], truth["spacing_um"], strict=True))
     tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed=3, brightness_spread=1.0)
@@ -222,7 +224,7 @@ def test_brightness_fills_its_range() -> None:
     brightness = np.array([nucleus.brightness for nucleus in tissue.nuclei])
     assert 1.0 <= brightness.min() < 1.1
     assert 2.3 < brightness.max() <= 2.5
-    # log-uniform: the median is the geometric mean of the ends
+    # Brightness is log-uniform, so its median is the geometric mean of the ends.
     assert np.median(brightness) == pytest.approx(math.sqrt(2.5), rel=0.1)
 
 
@@ -233,7 +235,7 @@ def test_tumour_cells_are_denser_on_their_side_and_vessels_fork() -> None:
     assert (x < 56.0).sum() > 3 * (x > 80.0).sum() > 0
     assert all(nucleus.center_um[2] < 90.0 for nucleus in tissue.nuclei if nucleus.cell_um > 0.0)
     starts = [tube.start_um for tube in tissue.vessels]
-    assert len(set(starts)) < len(starts)  # two branches leave one point
+    assert len(set(starts)) < len(starts)  # two branches start at one point
     assert len({tube.radius_um for tube in tissue.vessels}) >= 3
 
 
@@ -259,7 +261,7 @@ def test_each_dye_is_where_its_body_is() -> None:
 
 
 def test_blur_is_wider_along_z() -> None:
-    """The edge of a large ball rises over 2 sigma: slopes tell the sigmas."""
+    """The steepest slope at the edge of a large ball gives the sigma of the blur."""
     nucleus = Nucleus((8.0, 8.0, 8.0), (6.0, 6.0, 6.0), np.eye(3), 1.0, 0.0)
     tissue = Tissue((16.0, 16.0, 16.0), (nucleus,), ())
     box = Box((0, 0, 0), (58, 115, 115))
@@ -268,7 +270,7 @@ def test_blur_is_wider_along_z() -> None:
     x = voxels[28:31, 55:60, :57].mean(axis=(0, 1))
     slope_z = np.diff(z).max() / SPACING_UM[0]
     slope_x = np.diff(x).max() / SPACING_UM[2]
-    # the steepest slope of a blurred step is amplitude / (sigma sqrt(2 pi)); sampling widens sigma
+    # The steepest slope of a blurred step is amplitude / (sigma sqrt(2 pi)). Sampling widens sigma.
     for slope, sigma, step in ((slope_z, BLUR_UM[0], 0.28), (slope_x, BLUR_UM[2], 0.14)):
         wider = math.sqrt(sigma**2 + step**2 / 6.0)
         assert slope == pytest.approx(1000.0 / (wider * math.sqrt(2.0 * math.pi)), rel=0.15)
@@ -276,7 +278,7 @@ def test_blur_is_wider_along_z() -> None:
 
 def test_a_box_repeats_the_dye_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(microscope, "READ_NOISE", 0.0)
-    monkeypatch.setattr(microscope, "GAIN", 1e-3)  # many electrons: next to no Poisson noise
+    monkeypatch.setattr(microscope, "GAIN", 1e-3)  # many electrons, so almost no Poisson noise
     tissue = grow_tissue((6.72, 13.44, 13.44), seed=2, brightness_spread=1.0)
     whole = microscope.record(tissue, 1, box=Box((0, 0, 0), (24, 96, 96)), seed=2)
     part = Box((3, 20, 40), (20, 70, 96))
@@ -320,7 +322,7 @@ def test_bodies_measure_distances() -> None:
 def test_brain_cells_is_a_small_real_stack_with_its_licence(tmp_path: Path) -> None:
     path = tmp_path / "brain.ome.tif"
     write_brain_cells(path)
-    write_brain_cells(path)  # again: nothing to do
+    write_brain_cells(path)  # the second call changes nothing
     assert path.stat().st_size <= 2_000_000
     assert "BSD 3-Clause" in (tmp_path / "brain.LICENSE").read_text("utf-8")
     dataset = read.open(path)

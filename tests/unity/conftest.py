@@ -1,4 +1,4 @@
-"""The Unity package's scripts, compiled by Mono against stand-ins of Unity's classes (stubs/)."""
+"""Compile the Unity package's scripts with Mono against stand-ins of Unity's classes (stubs/)."""
 
 import json
 import shutil
@@ -18,7 +18,7 @@ Run = Callable[..., subprocess.CompletedProcess[bytes]]
 
 @pytest.fixture(scope="session")
 def assemblies(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of all assemblies, and of the harness that runs them."""
+    """Return the folder with all assemblies, and with the harness that runs them."""
     has_zip = any(Path("/usr/lib/mono").glob(f"*/{ZIP}"))
     if not (shutil.which("mcs") and shutil.which("mono") and NEWTONSOFT.exists() and has_zip):
         pytest.skip("needs Mono and Newtonsoft.Json: run `make mono`")
@@ -32,7 +32,7 @@ def assemblies(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def run(assemblies: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Run the harness with arguments and input. Each run has a Unity project of its own."""
+    """Run the harness with arguments and input. Each run has its own Unity project."""
 
     def run_harness(
         *args: object, data: bytes = b"", project: Path | None = None
@@ -52,7 +52,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of two tiles and two channels, one without surfaces; to be read only."""
+    """Return a bundle of two tiles and two channels, one without surfaces. Do not change it."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
     write_bundle(stage, out, None, engine=Engine(0))
     return out
@@ -60,7 +60,7 @@ def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def imported(run: Run) -> Callable[..., Any]:
-    """Import a bundle and return what the harness prints of it."""
+    """Import a bundle and return the harness's description of the imported objects."""
 
     def import_bundle(bundle: Path, **how: Any) -> Any:
         done = run("import", bundle, json.dumps(how))

@@ -1,4 +1,4 @@
-// As much of HLSL as march.hlsl uses, so that its text compiles as C++.
+// The parts of HLSL that march.hlsl uses, so that it compiles as C++.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

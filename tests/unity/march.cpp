@@ -1,5 +1,6 @@
-// March rays as the Unity shader does: its own text, with textures that are arrays here.
-// In: sizes x y z, volume (4 channels), table rows of four channels, uniforms, rays; out: linear RGBA each.
+// Marches rays with the Unity shader's own source, compiled as C++; textures are arrays.
+// Standard input: sizes x y z, volume (4 channels), one row of the table for each channel, uniforms, rays. Standard
+// output, for each ray: linear RGBA and the number of samples, as floats.
 #include "hlsl.hpp"
 
 static int size[3];
@@ -72,7 +73,7 @@ int main() {
     int rays;
     get(&rays, 1);
     for (int i = 0; i < rays; i++) {
-        float4 eye = vector(), dir = vector();  // eye.w: how far the scene is
+        float4 eye = vector(), dir = vector();  // eye.w is the distance of the scene
         samples = 0;
         float4 light = march(eye.xyz, dir.xyz, eye.w, shift, room);
         float out[5] = {light.x, light.y, light.z, light.w, float(samples)};

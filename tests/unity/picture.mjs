@@ -1,5 +1,6 @@
-// Draws boxes with the Unity shader, which glslang and SPIRV-Cross have brought to WebGL 2, in headless Chromium.
-// In: JSON of the shader, the uniforms' bytes and the textures of each box; out: the pixels, RGBA floats.
+// Draws boxes with the Unity shader in headless Chromium. glslang and SPIRV-Cross have converted the shader to WebGL 2.
+// Standard input is JSON with the shader, and with the uniforms' bytes and the textures of each box. Standard output has
+// the pixels as RGBA floats.
 import { chromium } from "playwright-core";
 
 const [path] = process.argv.slice(1);
@@ -44,7 +45,7 @@ const found = await page.evaluate((asked) => {
   gl.viewport(0, 0, width, height);
   gl.clearColor(0, 0, 0, 0);
   gl.clear(gl.COLOR_BUFFER_BIT);
-  // the pass's own state: Cull Front, where clockwise is front as in Unity, and Blend One OneMinusSrcAlpha
+  // The state of the shader's pass: Cull Front, with clockwise front faces as in Unity, and Blend One OneMinusSrcAlpha.
   gl.enable(gl.CULL_FACE);
   gl.frontFace(gl.CW);
   gl.cullFace(gl.FRONT);

@@ -1,4 +1,4 @@
-"""The Unity package's components: channels, the order of blending, the Inspector, the gaze."""
+"""The Unity package's components: channels, the order of blending, the Inspector and the gaze."""
 
 import json
 import subprocess
@@ -84,7 +84,7 @@ def test_channels_are_shown_coloured_and_classified_by_name(
 def test_a_player_has_no_property_blocks_which_would_break_batches(
     bundle: Path, imported: Import
 ) -> None:
-    """The scriptable pipelines batch renderers without property blocks alone."""
+    """The scriptable pipelines batch only renderers without property blocks."""
 
     def blocks(made: Any) -> list[str]:
         own = [made["name"]] if "block" in made else []
@@ -105,7 +105,7 @@ def test_hidden_channels_hide_their_surfaces_and_empty_boxes(
     for tile in found["root"]["children"]:
         for level in child(tile, "surfaces", "CD31")["children"]:
             assert not level["enabled"]
-            assert "block" not in level  # its material as it was imported
+            assert "block" not in level  # the imported material is unchanged
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_hidden_channels_hide_their_surfaces_and_empty_boxes(
         ({"name": "SetFunction", "args": ["CD31", "x"]}, "CD31 has no transfer function x"),
     ],
 )
-def test_an_unknown_name_is_named(bundle: Path, imported: Import, call: Any, message: str) -> None:
+def test_an_unknown_name_is_shown(bundle: Path, imported: Import, call: Any, message: str) -> None:
     assert imported(bundle, calls=[call]) == message
 
 
@@ -137,7 +137,7 @@ def test_volumes_are_blended_from_the_farthest_along_every_ray(run: Run) -> None
             hit = np.flatnonzero(far > np.maximum(near, 0) + 1e-6)
             along = hit[np.argsort(near[hit])]
             crossed += len(along)
-            assert (np.diff(np.array(order)[along]) < 0).all()  # the nearer, the later
+            assert (np.diff(np.array(order)[along]) < 0).all()  # nearer boxes are drawn later
     assert crossed > 3000
 
 
@@ -146,7 +146,7 @@ def test_volumes_are_blended_from_the_farthest_along_every_ray(run: Run) -> None
 def test_the_farther_tile_is_blended_first(bundle: Path, imported: Import, x: float) -> None:
     found = imported(bundle, calls=[{"name": "SortFrom", "args": [x, 0, 0.1]}])
     order = {tile: box["order"] for tile, box in boxes(found["root"])}
-    # the first tile is at greater x: the world is mirrored
+    # The world is mirrored, so the first tile has the larger x.
     near, far = ("r0_c0", "r0_c1") if x > 0 else ("r0_c1", "r0_c0")
     assert (order[near], order[far]) == (0, -1)
 
@@ -154,7 +154,7 @@ def test_the_farther_tile_is_blended_first(bundle: Path, imported: Import, x: fl
 def test_the_inspector_names_channels_and_functions(run: Run) -> None:
     found = json.loads(run("drawer").stdout)
     assert found["drawn"] == ["0+40 CD31", "40+20", "60+40 default, sharp 0"]
-    assert (found["visible"], found["function"]) == (False, 1)  # as it was clicked
+    assert (found["visible"], found["function"]) == (False, 1)  # the values after the clicks
 
 
 def gaze(run: Run, *frames: tuple[str | None, float, int]) -> list[tuple[float, list[str]]]:
@@ -164,17 +164,17 @@ def gaze(run: Run, *frames: tuple[str | None, float, int]) -> list[tuple[float, 
     return [(progress, shown) for progress, shown in json.loads(done.stdout)]
 
 
-def test_a_gaze_of_one_and_a_half_seconds_switches_a_tile_and_once(run: Run) -> None:
-    dt = 1 / 64  # exact in binary: 1.5 s are 96 frames, after the one that starts the clock
+def test_a_gaze_of_one_and_a_half_seconds_switches_a_tile_once(run: Run) -> None:
+    dt = 1 / 64  # s; exact in binary, so 1.5 s are 96 frames after the frame that starts the clock
     found = gaze(run, ("a", dt, 200), ("b", dt, 96), ("a", dt, 97), (None, dt, 5), ("b", 60.0, 3))
     shown = [names for _, names in found]
     assert shown[95] == []
     assert shown[96] == ["a"]
-    assert shown[199] == ["a"]  # once, however long it lasts
+    assert shown[199] == ["a"]  # only one switch, however long the gaze lasts
     assert found[0][0] == 0
     assert found[48][0] == 0.5
     assert found[96][0] == 0
-    assert shown[295] == ["a"]  # b was left a frame too early
+    assert shown[295] == ["a"]  # the gaze left b one frame too early
     assert shown[391] == ["a"]
     assert shown[392] == []  # back to surfaces
-    assert shown[-1] == []  # a stall of the program is no gaze
+    assert shown[-1] == []  # a stall of the program does not count as a gaze

@@ -1,4 +1,4 @@
-"""What the Unity importer reads: levels of volumes, many channels, and bundles with faults."""
+"""The Unity importer reads levels of volumes, many channels, and bundles with faults."""
 
 import json
 import shutil
@@ -34,7 +34,7 @@ def test_large_volumes_are_read_at_a_coarser_level(bundle: Path, imported: Impor
 
 
 @pytest.mark.slow
-def test_more_than_four_channels_are_marched_apart(
+def test_more_than_four_channels_are_drawn_in_several_boxes(
     bundle: Path, imported: Import, tmp_path: Path
 ) -> None:
     shutil.copytree(bundle, tmp_path / "five")
@@ -50,19 +50,19 @@ def test_more_than_four_channels_are_marched_apart(
         assert [box["channels"] for box in made] == [[0, 1, 2, 3], [4]]
         assert [box["material"]["_Volume"]["format"] for box in made] == ["RGBA32", "R8"]
         assert made[0]["name"] == "c0 + c1 + c2 + c3"
-        assert [box["enabled"] for box in made] == [True, False]  # four show at first
+        assert [box["enabled"] for box in made] == [True, False]  # at first, four channels show
     files = [box["file"].split("-")[0] for _, box in boxes(found["root"])]
     assert files == ["r0_c0", "r0_c0_1", "r0_c1", "r0_c1_1"]
     assert [c["isVisible"] for c in found["channels"]] == [True] * 4 + [False]
 
-    manifest["channels"][0]["opens"] = False  # the bundle says what it opens with
+    manifest["channels"][0]["opens"] = False  # the bundle states which channels it opens with
     (tmp_path / "five" / "manifest.json").write_text(json.dumps(manifest))
     found = imported(tmp_path / "five")
     assert [c["isVisible"] for c in found["channels"]] == [False, True, True, True, True]
 
 
 @pytest.mark.slow
-def test_what_a_layer_added_and_unity_lacks_is_named(
+def test_additions_that_unity_does_not_import_are_listed(
     stage: Path, bundle: Path, imported: Import, tmp_path: Path
 ) -> None:
     def change(edited: Usd.Stage) -> None:
@@ -78,7 +78,7 @@ def test_what_a_layer_added_and_unity_lacks_is_named(
 
 
 @pytest.mark.slow
-def test_a_bad_bundle_is_told_in_a_line(run: Run, bundle: Path, tmp_path: Path) -> None:
+def test_a_faulty_bundle_is_refused_in_one_line(run: Run, bundle: Path, tmp_path: Path) -> None:
     def refuse(name: str, spoil: Callable[[Path], None], *expected: str, **how: Any) -> None:
         copy = tmp_path / name
         shutil.copytree(bundle, copy)

@@ -1,7 +1,8 @@
-"""The Unity package's shader: its own text against the float64 march and against theory.
+"""The Unity package's ray march agrees with a float64 reference and with theory.
 
-march.hlsl keeps to what HLSL and C++ share, so g++ compiles it as it stands, with the few vector
-types of hlsl.hpp. Unity's world is mirrored to the specimen's (x), and so are the boxes here.
+march.hlsl uses only syntax that HLSL and C++ share. g++ compiles the file itself, with the few
+vector types of hlsl.hpp. Unity's world is the specimen's world mirrored in x, and so are the boxes
+in these tests.
 """
 
 import shutil
@@ -28,7 +29,7 @@ pytestmark = pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shader's march as a program; HLSL's literals are floats."""
+    """Compile the shader's march into a program, with float literals as in HLSL."""
     path = tmp_path_factory.mktemp("march") / "march"
     subprocess.run(
         [
@@ -44,7 +45,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @dataclass(frozen=True)
 class Marched:
     light: Values  # (rays, 4), linear, premultiplied
-    samples: NDArray[np.int64]  # of the volume, a ray
+    samples: NDArray[np.int64]  # (rays,), samples of the volume for each ray
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def march(
     whole: tuple[Values, Values] | None = None,
     lamps: tuple[Values, Values] | None = None,
 ) -> Marched:
-    """March rays that are given in the specimen's world. `whole`: corners of all tiles' box."""
+    """March rays, given in the specimen's world; `whole` is the box around all tiles."""
     size = np.array(block.channels[0].shape[::-1])
     texels = np.zeros((*size[::-1], 4), np.uint8)
     tables = np.zeros((4, 256, 4))
@@ -76,8 +77,8 @@ def march(
         texels[..., c] = voxels
     tables[:count], colors[:count, :3] = block.tables, block.colors
     low, high = np.array(block.low_um), np.array(block.high_um)
-    # the mirrored box: its low corner has the greatest x, and so the last texel of x; rows of the
-    # image run against y in both worlds
+    # The low corner of the mirrored box has the largest x of the specimen, so it lies at the last
+    # texel of x. Rows of the image run against y in both worlds.
     corner = MIRROR * [high[0], low[1], low[2]]
     first, last = (block.apron + 0.5) / size, (size - block.apron - 0.5) / size
     tex_low = [last[0], last[1], first[2]]
@@ -123,7 +124,7 @@ def picture(program: Path, block: Block, camera: Camera, how: How) -> Values:
 
 
 def waves(shape: tuple[int, int, int], seed: int, fades: bool) -> NDArray[np.uint8]:
-    """Return broad waves, 0..255; with `fades` there is nothing near the faces."""
+    """Return broad waves, 0..255; with `fades` they fade to 0 towards the faces."""
     phase = np.random.default_rng(seed).uniform(0, 6, 3)
     axes = np.meshgrid(*(np.linspace(0, 1, n) for n in shape), indexing="ij")
     wave: Values = 0.5 + 0.5 * np.cos(
@@ -137,7 +138,7 @@ def waves(shape: tuple[int, int, int], seed: int, fades: bool) -> NDArray[np.uin
 
 
 def block_of(*channels: NDArray[np.uint8], opacity: float = 0.2) -> Block:
-    """Return channels with an apron of 1, voxels of 1 x 1 x 2 um, colours and rising tables."""
+    """Return a block of channels: an apron of 1, voxels of 1 x 1 x 2 um, and rising opacities."""
     x, y, z = (np.array(channels[0].shape[::-1]) - 3) * np.array([1.0, 1.0, 2.0])
     tables = np.ones((len(channels), 256, 4))
     tables[..., 3] = np.rint(255 * opacity * np.linspace(0, 1, 256)) / 255
@@ -169,7 +170,7 @@ def test_a_uniform_cube_has_the_opacity_of_its_length(program: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_the_picture_is_the_reference_s(program: Path, count: int) -> None:
+def test_an_unshaded_picture_agrees_with_the_reference(program: Path, count: int) -> None:
     block = block_of(*(waves((18, 44, 40), seed, fades=False) for seed in range(count)))
     camera = aslant(block)
     found = picture(program, block, camera, How())
@@ -180,22 +181,22 @@ def test_the_picture_is_the_reference_s(program: Path, count: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fades", sweep([True, False], kept=[False]))  # is cut by the box's faces
+@pytest.mark.parametrize("fades", sweep([True, False], kept=[False]))  # False: cut by the box
 @pytest.mark.parametrize("count", sweep([1, 2], kept=[2]))
-def test_so_is_its_light(program: Path, count: int, fades: bool) -> None:
+def test_a_shaded_picture_agrees_with_the_reference(program: Path, count: int, fades: bool) -> None:
     block = block_of(*(waves((24, 44, 40), seed, fades) for seed in range(count)))
     camera = aslant(block)
     found = picture(program, block, camera, How(shading=1.0))
     expected = render(block, camera)
     dark = render(block, camera, shading=False)
-    assert np.abs(expected - dark).max() > 0.1  # that there is light to be wrong
+    assert np.abs(expected - dark).max() > 0.1  # shading changes the image visibly
     assert np.abs(found - expected).max() < 0.04
     assert psnr(np.rint(255 * found[..., :3]), np.rint(255 * expected[..., :3])) > 42
 
 
 @pytest.mark.slow
-def test_a_mirrored_picture_is_another(program: Path) -> None:
-    """What the comparison is worth: a flip of x, y or z is seen."""
+def test_a_flipped_volume_differs_from_the_reference(program: Path) -> None:
+    """The comparison of images detects a flip of x, y or z."""
     voxels = waves((18, 44, 40), 1, fades=False)
     camera = aslant(block_of(voxels))
     expected = render(block_of(voxels), camera, shading=False)
@@ -246,8 +247,8 @@ def test_tiles_share_the_steps_of_a_ray(program: Path) -> None:
     assert together == pytest.approx(march(program, whole, eye, direction).light, abs=4e-3)
 
 
-def test_many_tiles_take_no_more_steps_than_there_are(program: Path) -> None:
-    """One large tile and nine thin ones, each of which takes a step at least."""
+def test_many_tiles_take_no_more_steps_than_the_ray_has(program: Path) -> None:
+    """There are one large tile and nine thin ones, and each takes at least one step."""
     edges = [0.0, 100.0, *(100.0 + i for i in range(1, 10))]
     box = (np.array([0.0, -9, 0]), np.array([109.0, 0, 9]))
     eye, direction = np.array([[-50.0, -4.5, 4.5]]), np.array([[1.0, 0, 0]])
@@ -260,7 +261,7 @@ def test_many_tiles_take_no_more_steps_than_there_are(program: Path) -> None:
     assert 15 <= samples <= 20
 
 
-def test_rays_begin_at_an_eye_within_and_end_at_the_scene(program: Path) -> None:
+def test_rays_begin_at_an_eye_inside_the_box_and_end_at_the_scene(program: Path) -> None:
     block = block_of(np.full((11, 40, 40), 255, np.uint8), opacity=0.1)
     per_voxel = np.rint(25.5) / 255
     middle = (np.array(block.low_um) + block.high_um) / 2

@@ -1,4 +1,4 @@
-"""The Unity package as files: what its package manager, and its importers, go by."""
+"""The files of the Unity package agree with each other, as Unity's package manager needs them."""
 
 import json
 import re
@@ -19,14 +19,14 @@ MARCH = SHADERS / "march.hlsl"
 SHADER = SHADERS / "StereoCellVolume.shader"
 
 
-def test_its_version_is_the_product_s() -> None:
+def test_the_package_has_the_version_of_the_product() -> None:
     package = json.loads((PACKAGE / "package.json").read_text("utf-8"))
     assert package["version"] == version("stereocell")
     assert f"## {package['version']}\n" in (PACKAGE / "CHANGELOG.md").read_text("utf-8")
     assert (PACKAGE / "LICENSE.md").read_bytes() == (ROOT / "LICENSE").read_bytes()
 
 
-def test_what_it_needs_is_named_once_and_in_the_docs() -> None:
+def test_the_docs_name_each_dependency_and_its_version() -> None:
     package = json.loads((PACKAGE / "package.json").read_text("utf-8"))
     page = (ROOT / "docs" / "unity-unreal.md").read_text("utf-8")
     for name, least in package["dependencies"].items():
@@ -37,7 +37,7 @@ def test_what_it_needs_is_named_once_and_in_the_docs() -> None:
     assert f"Unity {package['unity']}" in page
 
 
-def test_each_asset_has_a_guid_of_its_own_that_stays() -> None:
+def test_each_asset_has_its_own_lasting_guid() -> None:
     found = {}
     for asset in assets():
         lines = meta_of(asset).read_text("utf-8").splitlines()
@@ -49,7 +49,7 @@ def test_each_asset_has_a_guid_of_its_own_that_stays() -> None:
     assert set(PACKAGE.rglob("*.meta")) == {meta_of(asset) for asset in assets()}
 
 
-def test_assemblies_refer_to_what_is_there() -> None:
+def test_assemblies_refer_to_assemblies_that_exist() -> None:
     names = {}
     for path in PACKAGE.rglob("*.asmdef"):
         assembly = json.loads(path.read_text("utf-8"))
@@ -64,14 +64,14 @@ def test_assemblies_refer_to_what_is_there() -> None:
     for path in PACKAGE.rglob("*.asmdef"):
         is_editors = "Editor" in path.relative_to(PACKAGE).parts
         platforms = json.loads(path.read_text("utf-8")).get("includePlatforms", [])
-        assert platforms == (["Editor"] if is_editors else [])  # so that no game carries it
+        assert platforms == (["Editor"] if is_editors else [])  # players do not contain editor code
     for script in PACKAGE.rglob("*.cs"):
         if "Editor" not in script.relative_to(PACKAGE).parts:
             assert "UnityEditor" not in script.read_text("utf-8")
 
 
-def test_assemblies_of_the_tests_see_what_those_of_the_package_see() -> None:
-    """The compiler's references in conftest.py are those of the .asmdef files."""
+def test_assemblies_in_tests_have_the_references_of_the_package() -> None:
+    """The compiler gets the same references in the tests as in the .asmdef files."""
     for path in PACKAGE.rglob("*.asmdef"):
         assembly = json.loads(path.read_text("utf-8"))
         named = {*assembly["references"], *assembly.get("precompiledReferences", [])}
@@ -82,7 +82,7 @@ def test_assemblies_of_the_tests_see_what_those_of_the_package_see() -> None:
 
 
 def test_the_sample_compiles_without_the_cardboard_plug_in(assemblies: Path) -> None:
-    """Its symbol is defined where the plug-in's package is, and no code asks for it elsewhere."""
+    """A symbol is defined only with the plug-in's package; other code works without the plug-in."""
     path = SAMPLES / "Cardboard" / "StereoCell.Samples.Cardboard.asmdef"
     (symbol,) = json.loads(path.read_text("utf-8"))["versionDefines"]
     assert symbol["name"] == "com.google.xr.cardboard"
@@ -103,7 +103,7 @@ def test_samples_are_declared() -> None:
 
 
 def documents(asset: Path) -> list[tuple[int, int, dict[str, Any]]]:
-    """Return an asset's objects, as Unity writes them: class, number in the file, fields."""
+    """Return the objects of an asset in Unity's YAML: class, number in the file, and fields."""
     text = asset.read_text("utf-8")
     assert text.startswith("%YAML 1.1\n%TAG !u! tag:unity3d.com,2011:\n")
     parts = re.split(r"^--- !u!(\d+) &(\d+)\n", text, flags=re.MULTILINE)[1:]
@@ -124,8 +124,8 @@ def references(value: Any) -> Iterator[dict[str, Any]]:
             yield from references(each)
 
 
-def test_written_assets_refer_to_what_is_there() -> None:
-    """Assets as Unity's YAML: well formed, and every GUID and number in them has its object."""
+def test_yaml_assets_refer_to_objects_that_exist() -> None:
+    """Assets in Unity's YAML are well formed, and their GUIDs and numbers belong to objects."""
     guids = {guid_of(asset): asset for asset in assets()}
     written = [
         asset for asset in assets() if asset.suffix in (".mat", ".asset", ".unity", ".prefab")
@@ -160,13 +160,13 @@ def names_in(file: str) -> set[str]:
     return found
 
 
-def test_scripts_set_only_what_the_shader_has() -> None:
+def test_scripts_set_only_properties_that_the_shader_has() -> None:
     shader = SHADER.read_text("utf-8")
     block = (SHADERS / "volume_material.hlsl").read_text("utf-8")
     properties = set(re.findall(r"^\s*(?:\[.*\] )?(_\w+) \(\"", shader, re.MULTILINE))
     uniforms = set(re.findall(r"^float4? (_\w+);", block, re.MULTILINE))
     assert uniforms | {"_Volume", "_Table"} == properties
-    # a material keeps only what is among its properties: the rest would be lost with the asset
+    # A material stores only values of its shader's properties. Other values would be lost.
     imported = names_in("Editor/VolumeBuilder.cs")
     chosen = names_in("Runtime/VolumeBox.cs")
     assert imported <= properties
@@ -187,7 +187,7 @@ def constant(name: str, source: str) -> list[float]:
     return [float(n) for n in found[1].strip(" ,").split(",")]
 
 
-def test_light_and_steps_are_the_viewer_s() -> None:
+def test_light_steps_and_dwell_are_those_of_the_viewer() -> None:
     march = MARCH.read_text("utf-8")
     room = (VIEWER / "gpu" / "room_light.ts").read_text("utf-8")
     lamps = {

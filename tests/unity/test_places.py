@@ -1,7 +1,7 @@
-"""Where the Unity importer puts things, in Unity's left-handed metres.
+"""The Unity importer puts volumes and surfaces at the right positions, in left-handed metres.
 
-Expected places are those of the specimen, mirrored in x: so glTFast mirrors what it imports, and
-the stand-in of the editor (stubs/UnityEditor.cs) does with each .glb.
+Expected positions are those of the specimen, mirrored in x. glTFast mirrors x on import, and so
+does its stub (stubs/GltFast.cs) with each .glb.
 """
 
 import json
@@ -25,7 +25,7 @@ Import = Callable[..., Any]
 
 @pytest.fixture
 def edited(stage: Path, tmp_path: Path) -> Callable[[Gf.Matrix4d], Path]:
-    """The bundle in which the second tile is moved by a matrix (row vectors, um)."""
+    """Return a function that writes a bundle whose second tile has a matrix (row vectors, um)."""
 
     def write(matrix: Gf.Matrix4d) -> Path:
         layer = Sdf.Layer.CreateNew(str(tmp_path / "edited.usda"))
@@ -42,7 +42,7 @@ def edited(stage: Path, tmp_path: Path) -> Callable[[Gf.Matrix4d], Path]:
 
 
 def check_volumes(found: Any, bundle: Path) -> None:
-    """Each voxel is where the specimen has it, from Unity's world by the shader's own numbers."""
+    """Check each voxel's texture coordinates, from Unity's world by the shader's own values."""
     root = found["root"]
     ids = [c["id"] for c in found["channels"]]
     places = list(boxes(root))
@@ -70,7 +70,7 @@ def check_volumes(found: Any, bundle: Path) -> None:
             at = np.stack([a[0] + x, b[1] - y, a[2] + z], axis=1)
             matrix = np.array(volume["matrix"]).reshape(4, 4).T  # column by column
             world = world_of(root, bundle, at @ matrix[:3, :3].T + matrix[:3, 3])
-            # as Unity does it: the object's own space, then the shader's
+            # As in Unity, from the world to the object's space, and then to the shader's space
             scale = root["scale"][0] * box["scale"][0]
             inside = (world - box["position"]) / scale
             in_box = inside @ to_box[:, :3].T + to_box[:, 3]
@@ -86,7 +86,7 @@ def check_volumes(found: Any, bundle: Path) -> None:
         triangles = vertices[np.array(box["triangles"]).reshape(-1, 3)]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         outwards = (normals * (triangles.mean(axis=1) - vertices.mean(axis=0))).sum(axis=1)
-        assert (outwards > 0).all()  # Unity's front: clockwise, left-handed
+        assert (outwards > 0).all()  # a front face in Unity: clockwise, left-handed
         assert len(triangles) == 12
         around = [material["_AllLow"][:3], material["_AllHigh"][:3]]
         for _, other in places:
@@ -98,7 +98,7 @@ def check_volumes(found: Any, bundle: Path) -> None:
 
 
 def check_surfaces(found: Any, bundle: Path) -> int:
-    """Each level is where its tile is; return how many there are."""
+    """Check that each surface lies in its tile; return the number of surfaces."""
     count = 0
     for tile in load(bundle / "manifest.json")["tiles"]:
         made = child(found["root"], tile["id"])
@@ -137,8 +137,8 @@ def test_volumes_and_surfaces_are_in_their_places(bundle: Path, imported: Import
 
 
 @pytest.mark.slow
-def test_surface_and_volume_of_a_sphere_are_one(bundle: Path, imported: Import) -> None:
-    """The glb by its own places, the volume by the shader's: both about the same centre."""
+def test_surface_and_volume_of_a_sphere_coincide(bundle: Path, imported: Import) -> None:
+    """The .glb's own positions and the shader's positions of voxels have the same bounds."""
     found = imported(bundle)
     root = found["root"]
     tile = child(root, "r0_c0")
@@ -161,7 +161,7 @@ def test_surface_and_volume_of_a_sphere_are_one(bundle: Path, imported: Import) 
 
 
 @pytest.mark.slow
-def test_the_package_s_own_test_in_the_editor_tells_a_mirrored_surface(
+def test_the_package_s_own_test_in_the_editor_finds_a_mirrored_surface(
     run: Run, bundle: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lies = "SurfacesLieInTheirVolumes"
@@ -215,7 +215,8 @@ def test_levels_of_detail_follow_their_errors(bundle: Path, imported: Import) ->
         group = child(made, "surfaces", "CD31")
         size = max(made["collider"])
         assert group["size"] == pytest.approx(size)
-        # an object of share h of a screen of 1080 pixels: an error e of it is e / size * h * 1080
+        # If an object takes the share h of a screen of 1080 pixels, its error e takes
+        # e / size * h * 1080 pixels.
         *errors, finest = errors
         assert finest == 0
         expected = [2 * size / (1080 * e) for e in reversed(errors)] + [0]
@@ -231,12 +232,12 @@ def test_levels_of_detail_follow_their_errors(bundle: Path, imported: Import) ->
     [
         ("0", [0]),
         ("0,1,2", [0.5, 0.25, 0]),
-        ("0,1,1,1", [0.5, 0.495, 0.49005, 0]),  # they have to fall
+        ("0,1,1,1", [0.5, 0.495, 0.49005, 0]),  # Unity needs falling heights
         ("0,0,1", [1, 0.5, 0]),
         ("0,0.001,1", [1, 0.5, 0]),
     ],
 )
-def test_heights_fall(run: Run, errors: str, expected: list[float]) -> None:
+def test_heights_of_levels_fall(run: Run, errors: str, expected: list[float]) -> None:
     done = run("heights", errors, 25, 2, 100)
     assert json.loads(done.stdout) == pytest.approx(expected)
 

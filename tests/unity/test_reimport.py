@@ -1,7 +1,7 @@
-"""A `.stereocell` asset in a project: what a change of the bundle does, and what it leaves alone.
+"""A changed bundle is imported again, and the rest of the project stays as it is.
 
-The stub of Unity's asset database imports when its documentation says that Unity does, and fails
-when an import writes into the project.
+The stub of Unity's asset database imports in the cases that Unity's documentation states. It fails
+if an import writes into the project.
 """
 
 import json
@@ -23,7 +23,7 @@ Import = Callable[..., Any]
 
 @pytest.fixture(scope="module")
 def rebuilt(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The bundle, built anew after its first channel's colour was edited."""
+    """Return the bundle, built again after an edit of its first channel's colour."""
     folder = tmp_path_factory.mktemp("rebuilt")
     layer = Sdf.Layer.CreateNew(str(folder / "green.usda"))
     layer.subLayerPaths = [str(stage)]
@@ -43,18 +43,18 @@ def test_a_changed_bundle_is_imported_again_and_nothing_of_the_project_is_lost(
     assert done.returncode == 0, done.stderr.decode()
     first, same, changed, damaged = json.loads(done.stdout)
     assert first["errors"] == same["errors"] == changed["errors"] == []
-    assert same["imports"] == 0  # coming back to the editor costs nothing
+    assert same["imports"] == 0  # coming back to the editor imports nothing
     assert changed["imports"] == 1
-    # overrides and references go by these, so they stay
+    # Overrides and references use these names, so they must not change.
     assert first["objects"] == changed["objects"]
     assert first["paths"] == changed["paths"]
     assert len(set(first["paths"])) == len(first["paths"])
-    # the bundle's colour is new, the project's own material is kept
+    # The bundle's new colour is imported, and the project's own material is kept.
     assert changed["color"] != first["color"]
     assert changed["color"][:3] == pytest.approx([0, 1, 0], abs=1e-6)
     assert first["materials"] == changed["materials"] == ["my own"]
     assert not any(name.startswith("material CD31") for name in first["objects"])
-    # a damaged bundle is told in the asset's import log
+    # The asset's import log reports the damaged bundle.
     (error,) = damaged["errors"]
     assert error.startswith("Assets/Mine.stereocell: ")
     assert "\n" not in error
@@ -62,7 +62,7 @@ def test_a_changed_bundle_is_imported_again_and_nothing_of_the_project_is_lost(
 
 
 @pytest.mark.slow
-def test_parts_of_the_asset_are_called_after_the_bundle(bundle: Path, imported: Import) -> None:
+def test_parts_of_the_asset_are_named_after_the_bundle(bundle: Path, imported: Import) -> None:
     found = imported(bundle)
     names = found["objects"]
     assert "specimen" in names
@@ -72,12 +72,12 @@ def test_parts_of_the_asset_are_called_after_the_bundle(bundle: Path, imported: 
     materials = [name for name in names if name.startswith("material ")]
     assert set(names) == {"specimen", "transfer functions", *surfaces, *volumes, *materials}
     assert "material CD31" in materials
-    assert len(materials) < len(surfaces)  # equal ones are one
+    assert len(materials) < len(surfaces)  # equal materials are shared
     assert [Path(path).name for path in found["sources"]] == ["StereoCellVolume.shader"]
 
 
 @pytest.mark.slow
-def test_a_copy_is_imported_as_a_link_is(bundle: Path, imported: Import) -> None:
+def test_a_copy_is_imported_like_a_link(bundle: Path, imported: Import) -> None:
     linked, copied = imported(bundle), imported(bundle, copy=True)
     assert copied["objects"] == linked["objects"]
     volumes = [
@@ -88,7 +88,7 @@ def test_a_copy_is_imported_as_a_link_is(bundle: Path, imported: Import) -> None
 
 
 @pytest.mark.slow
-def test_a_file_of_voxels_is_called_after_its_content(bundle: Path, imported: Import) -> None:
+def test_a_voxel_file_is_named_after_its_content(bundle: Path, imported: Import) -> None:
     def files(found: Any) -> list[str]:
         return [box["file"] for _, box in boxes(found["root"])]
 
@@ -98,7 +98,7 @@ def test_a_file_of_voxels_is_called_after_its_content(bundle: Path, imported: Im
 
 
 @pytest.mark.slow
-def test_a_player_takes_along_the_voxels_of_its_scenes(run: Run, bundle: Path) -> None:
+def test_a_player_contains_the_voxels_of_its_scenes(run: Run, bundle: Path) -> None:
     done = run("build", bundle)
     assert done.returncode == 0, done.stderr.decode()
     found = json.loads(done.stdout)
@@ -116,7 +116,7 @@ def test_a_player_takes_along_the_voxels_of_its_scenes(run: Run, bundle: Path) -
         ("PK nothing", "damaged zip file"),
     ],
 )
-def test_another_file_of_that_ending_is_refused_in_a_line(
+def test_an_asset_that_is_not_a_bundle_is_refused_in_one_line(
     run: Run, tmp_path: Path, text: str, expected: str
 ) -> None:
     (tmp_path / "Assets").mkdir()

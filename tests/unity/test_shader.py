@@ -1,4 +1,4 @@
-"""The Unity package's shader whole: it compiles as HLSL, and draws what was imported."""
+"""The whole shader of the Unity package compiles as HLSL and draws an imported specimen."""
 
 import re
 import shutil
@@ -58,8 +58,8 @@ def test_the_sample_s_reticle_compiles(
 
 @each_pipeline
 @pytest.mark.skipif(shutil.which("spirv-cross") is None, reason="needs SPIRV-Cross: `make mono`")
-def test_each_eye_has_a_layer_a_camera_and_a_place(pipeline: str, tmp_path: Path) -> None:
-    """Single-pass instanced: an instance is an eye's, and goes to the eye's layer of the target."""
+def test_each_eye_has_its_layer_its_matrix_and_its_position(pipeline: str, tmp_path: Path) -> None:
+    """In single-pass instanced mode, each instance is drawn into its eye's layer of the target."""
     spirv = {s: compile_stage(s, tmp_path, STEREO, pipeline=pipeline) for s in STAGES}
     vertex = cross(spirv["vert"], "--version", "450")
     assert re.search(r"gl_Layer = .+;", vertex)
@@ -92,25 +92,25 @@ def test_every_number_of_a_material_is_in_the_block_that_is_batched(
     assert all(found["UnityPerMaterial"] == material for found in blocks)
     others = [m["name"] for name, b in blocks[0].items() if b is not material for m in b["members"]]
     assert not numbers & set(others)
-    assert "shader_feature" not in text  # a keyword would make another variant, and break batches
+    assert "shader_feature" not in text  # a keyword would make another variant and break batches
     assert "multi_compile_local" not in text
 
 
 @each_pipeline
-def test_an_unknown_name_does_not(pipeline: str, tmp_path: Path) -> None:
-    """The compiler sees the whole program, so the tests above can fail."""
+def test_a_shader_with_an_unknown_name_does_not_compile(pipeline: str, tmp_path: Path) -> None:
+    """The compiler checks the whole program, so the tests of variants can fail."""
     with pytest.raises(subprocess.CalledProcessError):
         compile_stage("frag", tmp_path, "march=gone+", pipeline=pipeline)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """An import as the shader is given it, and as the reference reads it."""
+    """An imported specimen with the shader's inputs, and the same volumes for the reference."""
 
-    boxes: list[dict[str, Any]]  # from the farthest
-    blocks: list[Block]  # likewise
+    boxes: list[dict[str, Any]]  # farthest first
+    blocks: list[Block]  # farthest first
     camera: Camera
-    um: float  # world units
+    um: float  # length of 1 um in world units
 
     def draw(self, folder: Path, *defines: str, pipeline: str = "builtin", **values: Any) -> Values:
         boxes = [{**box, "values": {**box["values"], **values}} for box in self.boxes]
@@ -127,7 +127,7 @@ class Scene:
 
 @pytest.fixture
 def scene(bundle: Path, imported: Callable[..., Any]) -> Callable[[tuple[float, ...]], Scene]:
-    """See the two tiles from a place, um from their middle."""
+    """Return a function that views the two tiles from a position, in um from their centre."""
 
     def look(away_um: tuple[float, ...]) -> Scene:
         found = imported(bundle)
@@ -178,7 +178,7 @@ needs_browser = pytest.mark.skipif(
 def test_an_imported_specimen_is_drawn_as_the_reference_draws_it(
     tmp_path: Path, scene: Callable[..., Scene], shading: float, pipeline: str
 ) -> None:
-    """From the bundle to the pixel: importer, places, textures, shader, culling, blending."""
+    """Importer, positions, textures, shader, culling and blending agree with the reference."""
     seen = scene((9, 7, 30))
     picture = seen.draw(tmp_path, pipeline=pipeline, _Shading=shading)
     expected = seen.expected(seen.blocks, shading=shading > 0)
@@ -186,25 +186,25 @@ def test_an_imported_specimen_is_drawn_as_the_reference_draws_it(
     assert np.abs(picture - expected).mean() < 0.002
     assert decibels(picture, expected) > 40
     flipped = np.abs(picture[:, ::-1] - expected).mean()
-    assert flipped > 5 * np.abs(picture - expected).mean()  # that a mirrored one would be seen
+    assert flipped > 5 * np.abs(picture - expected).mean()  # a mirrored image would be detected
 
 
 @pytest.mark.slow
 @needs_browser
 @each_pipeline
-def test_it_ends_at_the_scene_s_depth(
+def test_rays_end_at_the_depth_of_the_scene(
     tmp_path: Path, scene: Callable[..., Scene], pipeline: str
 ) -> None:
-    """A wall across the volume, at the centres of a slice: what is behind it is not drawn."""
+    """Voxels behind a wall are not drawn. The wall crosses the volume at the centres of a slice."""
     seen = scene((0, 0, 30))
-    slices = 6  # of 8, that are hidden
+    slices = 6  # number of hidden slices, of 8
     blocks = []
     for block in seen.blocks:
         low = np.add(block.low_um, [0, 0, slices * block.spacing_um()[2]])
         channels = tuple(voxels[slices:] for voxels in block.channels)
         blocks.append(replace(block, low_um=tuple(low), channels=channels))
     depth = (seen.camera.eye_um[2] - blocks[0].low_um[2]) * seen.um
-    # the depth buffer is 1 everywhere: the wall is at 1 / (z + w)
+    # The depth buffer is 1 everywhere, so the wall is at the distance 1 / (z + w).
     wall: dict[str, Any] = {
         "_ZBufferParams": [0, 0, 0.25 / depth, 0.75 / depth],
         "_ProjectionParams": [1, 0, 0, 0],
@@ -226,7 +226,7 @@ def test_a_gamma_project_gets_encoded_colours(
     tmp_path: Path, scene: Callable[..., Scene], pipeline: str
 ) -> None:
     seen = scene((9, 7, 30))
-    one = replace(seen, boxes=seen.boxes[:1])  # blending is another in a gamma project
+    one = replace(seen, boxes=seen.boxes[:1])  # a gamma project blends several boxes differently
     linear = one.draw(tmp_path, pipeline=pipeline)
     coded = one.draw(tmp_path, GAMMA, pipeline=pipeline)
     assert np.allclose(coded[..., 3], linear[..., 3], atol=1e-6)

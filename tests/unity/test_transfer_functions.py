@@ -1,4 +1,4 @@
-"""The window of transfer functions: curves and gradients to a layer that `bundle` takes over."""
+"""The window for transfer functions writes curves and gradients to a layer for `bundle`."""
 
 import json
 import subprocess
@@ -20,7 +20,7 @@ Run = Callable[..., subprocess.CompletedProcess[bytes]]
 
 
 def rows() -> list[list[int]]:
-    """Return opacities of 256 intensities: ramps, steps, smooth and noisy ones."""
+    """Return rows of opacities for 256 intensities: constants, ramps, steps, smooth, and noise."""
     x = np.linspace(0, 1, 256)
     steps = np.where((x > 0.3) & (x < 0.6), 200, 10)
     smooth = 255 * np.exp(-(((x - 0.5) / 0.2) ** 2))
@@ -38,18 +38,18 @@ def test_functions_survive_points_curves_and_gradients(run: Run) -> None:
     for row, found in zip(rows(), json.loads(done.stdout), strict=True):
         points = found["points"]
         sizes.append(len(points))
-        # a line through bytes is off by a step at most
+        # A line through bytes is off by at most one step.
         assert np.abs(np.subtract(found["row"], row)).max() <= 1
         assert np.abs(np.subtract(found["curve"], found["row"])).max() == 0
         assert found["keys"] == min(len(points), 8)
         if len(points) <= 8:
             assert found["gradient"] == found["row"]
-        # the pipeline evaluates the same points to the same bytes
+        # The pipeline evaluates the same points to nearly the same bytes.
         again = np.rint(255 * evaluate(tuple(map(tuple, points)), size=256))
         assert np.abs(again - found["row"]).max() <= 1
         assert (again != found["row"]).mean() < 0.02
     assert sizes[:3] == [2, 2, 2]
-    assert sizes[3] <= 5  # its four points, of which one lies between two intensities
+    assert sizes[3] <= 5  # four points, one of them between two intensities
     assert sizes[4] == 6  # a step takes two points
     assert sizes[5] < 30
 
@@ -64,7 +64,7 @@ POINTS = [[0, 0], [0.25, 0.1], [0.5, 0.75], [1, 0.2]]
 
 
 def row_of(points: list[list[float]]) -> NDArray[np.float32]:
-    """Return the opacities of 256 intensities, in bytes; a stage's numbers are single floats."""
+    """Return the opacities for 256 intensities, 0..255; a stage's numbers are 32-bit floats."""
     exact = tuple((float(np.float32(x)), float(np.float32(y))) for x, y in points)
     row: NDArray[np.float32] = np.rint(255 * evaluate(exact, size=256))
     return row
@@ -75,7 +75,7 @@ def test_edits_of_the_window_reach_a_new_bundle(
     run: Run, bundle: Path, stage: Path, tmp_path: Path
 ) -> None:
     layer = tmp_path / "from_unity.usda"
-    # each field is the first of its label, so of the first channel, CD31
+    # The stub changes the first field with a label, which belongs to the first channel, CD31.
     name = load(bundle / "manifest.json")["channels"][0]["name"]
     assert name == "CD31"
     found = edited(
@@ -88,9 +88,9 @@ def test_edits_of_the_window_reach_a_new_bundle(
     function = channel(bundle)["transfer_function"]
     expected = row_of(POINTS)
     row = channel(bundle)["transfer_functions"].index(function)
-    # the scene shows it, and the imported table stays as it was
+    # The scene shows the edit, and the imported table is unchanged.
     shown = texels_of(found["shown"])[0, row, :, 3].astype(int)
-    assert np.abs(shown - expected).max() <= 1  # what lies between two bytes may fall to either
+    assert np.abs(shown - expected).max() <= 1  # rounding may differ by one
     assert (shown != expected).mean() < 0.05
     before = decode_finest((bundle / channel(bundle)["lut"]["path"]).read_bytes())[0]
     assert np.array_equal(texels_of(found["imported"])[0, row], before[row])
@@ -103,7 +103,7 @@ def test_edits_of_the_window_reach_a_new_bundle(
     assert np.array_equal(lut[row, :, 3], expected)
     assert after["color"] == pytest.approx([0.21404114, 1, 0], abs=1e-6)
     assert after["opens"] is False
-    # the other functions and channels are as they were
+    # Other functions and channels are unchanged.
     others = [i for i in range(len(before)) if i != row]
     assert np.array_equal(lut[others], before[others])
     blue = load(bundle / "manifest.json")["channels"][1]["name"]
@@ -112,7 +112,7 @@ def test_edits_of_the_window_reach_a_new_bundle(
 
 
 @pytest.mark.slow
-def test_a_choice_is_written_and_what_was_not_edited_is_not(
+def test_a_chosen_function_is_written_and_unedited_values_are_not(
     run: Run, bundle: Path, stage: Path, tmp_path: Path
 ) -> None:
     layer = tmp_path / "chosen.usda"
@@ -132,7 +132,7 @@ def test_a_choice_is_written_and_what_was_not_edited_is_not(
     assert np.array_equal(decode_finest((tmp_path / "out" / after).read_bytes()), before)
 
 
-def test_nothing_edited_writes_no_layer_and_the_stage_is_never_written(
+def test_no_layer_is_written_without_edits_or_over_the_stage(
     run: Run, bundle: Path, stage: Path, tmp_path: Path
 ) -> None:
     layer = tmp_path / "none.usda"
@@ -159,7 +159,7 @@ def test_a_gradient_of_several_colours_is_refused_in_the_window(
 def test_a_new_colour_keeps_a_function_of_many_points(
     run: Run, bundle: Path, stage: Path, tmp_path: Path
 ) -> None:
-    """A gradient holds eight keys, so it shows an approximation of such a function."""
+    """A gradient has at most eight keys, so it only approximates a function with more points."""
     layer = tmp_path / "many.usda"
     points = [[i / 11, (i * 7 % 12) / 12] for i in range(12)]
     edited(

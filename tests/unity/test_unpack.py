@@ -1,4 +1,4 @@
-"""The Unity package reads zstd and KTX2 by itself: the same bytes as other decoders."""
+"""The Unity package's own readers of zstd and KTX2 return the original bytes."""
 
 import struct
 import subprocess
@@ -15,7 +15,7 @@ Run = Callable[..., subprocess.CompletedProcess[bytes]]
 
 
 def kinds() -> list[bytes]:
-    """Return what frames are made of: noise, runs, words, smooth voxels, and lengths at borders."""
+    """Return contents for frames: noise, runs, words, smooth voxels, and lengths at limits."""
     rng = np.random.default_rng(7)
     noise = rng.integers(0, 256, 70_000, dtype=np.uint8).tobytes()
     few = rng.choice([3, 3, 3, 9, 200], 50_000).astype(np.uint8).tobytes()
@@ -39,7 +39,7 @@ def kinds() -> list[bytes]:
 
 
 def unpack(run: Run, frames: list[tuple[bytes, int]]) -> list[bytes | None]:
-    """Return what each frame holds, None where it is refused."""
+    """Return the unpacked bytes of each frame; None if the frame is refused."""
     data = struct.pack("<i", len(frames))
     for frame, size in frames:
         data += struct.pack("<ii", len(frame), size) + frame
@@ -69,8 +69,8 @@ def test_frames_unpack_to_what_was_packed(run: Run) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
-def test_random_contents(run: Run, seed: int) -> None:
-    """Blocks of every make: literals of few and many symbols, copies near and far."""
+def test_frames_of_random_contents_unpack(run: Run, seed: int) -> None:
+    """Blocks have literals of few and of many symbols, and copies from near and far."""
     rng = np.random.default_rng(seed)
     plain, frames = [], []
     for _ in range(60):
@@ -86,10 +86,10 @@ def test_random_contents(run: Run, seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_damaged_frame_is_refused_or_another_never_a_crash(run: Run) -> None:
+def test_a_damaged_frame_never_crashes_and_a_cut_one_is_refused(run: Run) -> None:
     rng = np.random.default_rng(1)
     frames: list[tuple[bytes, int]] = []
-    cut = []  # their places
+    cut = []  # indices of the frames that were cut
     for content in kinds()[:6]:
         whole = zstandard.compress(content[:60_000])
         size = min(60_000, len(content))
@@ -105,7 +105,7 @@ def test_a_damaged_frame_is_refused_or_another_never_a_crash(run: Run) -> None:
     assert all(found[i] is None for i in cut)
 
 
-def test_each_level_of_a_volume_and_a_table(run: Run, tmp_path: Path) -> None:
+def test_each_level_of_a_volume_and_a_table_are_read(run: Run, tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     levels = [
         rng.integers(0, 256, shape, np.uint8) for shape in ((7, 13, 21), (3, 6, 10), (1, 3, 5))
@@ -119,12 +119,12 @@ def test_each_level_of_a_volume_and_a_table(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("at", [0, 12, 20, 24, 28, 40, 44, 80, 88, 96])
-def test_another_texture_is_refused_in_a_line(run: Run, tmp_path: Path, at: int) -> None:
+def test_a_texture_with_a_damaged_header_is_refused(run: Run, tmp_path: Path, at: int) -> None:
     data = bytearray(encode_3d([np.full((4, 5, 6), 7, np.uint8)]).data)
     data[at] ^= 0x41
     (tmp_path / "v.ktx2").write_bytes(data)
     done = run("ktx2", tmp_path / "v.ktx2", 0)
-    if at == 40:  # one level more or less is not read
+    if at == 40:  # a wrong number of levels may go unnoticed
         assert done.returncode in (0, 1)
     else:
         assert done.returncode == 1

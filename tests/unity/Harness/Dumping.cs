@@ -1,4 +1,4 @@
-// Objects of the scene as JSON.
+// Describes objects of the scene as JSON.
 using System;
 using System.Collections.Generic;
 using System.Linq;

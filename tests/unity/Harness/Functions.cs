@@ -1,4 +1,4 @@
-// Transfer functions: points, curves, gradients, and the window that writes a layer.
+// Converts transfer functions between points, curves and gradients, and drives the window that writes a layer.
 using System;
 using System.Collections.Generic;
 using System.Linq;
@@ -10,7 +10,8 @@ using UnityEngine;
 
 static class Functions
 {
-    /// <summary>Rows of 256 opacities: the points of each, and its row again by points, curve and gradient.</summary>
+    /// <summary>For each row of 256 opacities, return its points, and the row again after a conversion to points, to a
+    /// curve and to a gradient.</summary>
     public static JToken Points(JArray rows)
     {
         var found = new JArray();
@@ -40,8 +41,8 @@ static class Functions
     }
 
     /// <summary>
-    /// Open the window on an imported bundle, change fields frame by frame, and write the layer. A frame is
-    /// {"field": label, ...}: "points" of a curve or gradient, "colors" of a gradient, or a "value".
+    /// Open the window on an imported bundle, change one field in each frame, and write the layer. A frame is
+    /// {"field": label, ...} with the "points" of a curve or gradient, the "colors" of a gradient, or a "value".
     /// </summary>
     public static JToken Layer(string folder, string stage, string layer, JArray frames)
     {

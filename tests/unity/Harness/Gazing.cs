@@ -1,4 +1,4 @@
-// Frames of a player: gaze, loading, the reticle and the button.
+// Runs frames of a player: gaze, loading, the reticle and the button.
 using System;
 using System.Collections.Generic;
 using System.IO;
@@ -14,7 +14,8 @@ using UnityEngine.Rendering;
 
 static class Gazing
 {
-    /// <summary>Frames [[target or null, seconds], ...]: whether each one switches the tile, and the ring's progress.</summary>
+    /// <summary>Run frames [[target or null, seconds], ...]. Returns for each frame the ring's progress, and the tiles that
+    /// show their volume.</summary>
     public static JToken Gaze(JArray frames)
     {
         Camera.main = new GameObject("camera").AddComponent<Camera>();
@@ -41,9 +42,9 @@ static class Gazing
     }
 
     /// <summary>
-    /// Look at each tile of a specimen until it shows its volume. Sizes and budget are asked for; the files hold a pattern.
-    /// Returns what shows after each tile, the most memory of textures, the most bytes that a frame uploads, and whether
-    /// a texture that the GPU has lost is loaded again.
+    /// Look at each tile of a specimen until it shows its volume. The arguments state sizes and budget. Each channel of a
+    /// tile has one value in all voxels. Returns the visible tiles after each step, the peak memory of textures, the largest
+    /// upload of one frame, and whether a texture that the GPU has lost is loaded again.
     /// </summary>
     public static JToken Tour(JObject asked)
     {
@@ -87,7 +88,7 @@ static class Gazing
         var reloaded = false;
         if (last is RenderTexture)
         {
-            ((RenderTexture)last).Release();  // as a phone's GPU does while the program is in the background
+            ((RenderTexture)last).Release();  // a phone's GPU may do this while the program is in the background
             for (var frame = 0; frame < 100000 && !reloaded; frame++)
             {
                 Program.Send(specimen, "Update");
@@ -146,7 +147,8 @@ static class Gazing
         return specimen;
     }
 
-    /// <summary>The sample's scene around an imported bundle: the reticle fills, the tile switches, the button switches it back.</summary>
+    /// <summary>Run the sample's scene around an imported bundle. The reticle fills, the tile switches, and the button
+    /// switches it back.</summary>
     public static JToken Sample(string folder)
     {
         SystemInfo.copyTextureSupport = (CopyTextureSupport)31;

@@ -1,4 +1,4 @@
-// Imports of bundles, by the stub's asset database.
+// Imports bundles through the stub of Unity's asset database.
 using System;
 using System.IO;
 using System.Linq;
@@ -14,7 +14,7 @@ static class Importing
 {
     const string Asset = "Assets/Mine.stereocell";
 
-    /// <summary>Link a bundle into the project, with the import's error as an exception.</summary>
+    /// <summary>Link or copy a bundle into the project. An error of the import becomes an exception.</summary>
     public static GameObject Link(string folder, bool isCopy = false)
     {
         try
@@ -27,7 +27,7 @@ static class Importing
         }
     }
 
-    /// <summary>Import an asset that lies in the project already. Returns the errors.</summary>
+    /// <summary>Import an asset that is already in the project. Returns the errors.</summary>
     public static JToken Asked(string asset)
     {
         AssetDatabase.ImportAsset(asset);
@@ -68,7 +68,7 @@ static class Importing
             new JProperty("table", Dumping.Dump(specimen.table)));
     }
 
-    /// <summary>Returns the message of a call that is refused.</summary>
+    /// <summary>Call a method of the specimen. Returns the error message if the call is refused, else null.</summary>
     static string Call(Specimen specimen, string method, JArray args)
     {
         if (method == "SortFrom") specimen.SortFrom(new Vector3((float)args[0], (float)args[1], (float)args[2]));
@@ -98,8 +98,8 @@ static class Importing
     }
 
     /// <summary>
-    /// A person's day: link a bundle, give a channel a material of the project, come back to the editor with the same
-    /// bundle, then with one that was built anew, then with one that is damaged. Returns what was imported after each.
+    /// Link or copy a bundle, and give a channel one of the project's materials. Then come back to the editor three times:
+    /// with the same bundle, with a rebuilt one, and with a damaged one. Returns the state of the import after each step.
     /// </summary>
     public static JToken Changes(string folder, string other, string how)
     {
@@ -130,7 +130,7 @@ static class Importing
         return days;
     }
 
-    /// <summary>Come to the front: Unity looks at the project's files, and the package at its bundles.</summary>
+    /// <summary>Bring the editor to the front. Unity then checks the project's files, and the package its bundles.</summary>
     static void ComeBack()
     {
         AssetDatabase.Refresh();
@@ -170,7 +170,7 @@ static class Importing
         }
     }
 
-    /// <summary>The package's own tests, as Unity's test runner would run them.</summary>
+    /// <summary>Run the package's own tests as Unity's test runner would.</summary>
     public static JToken Tests(float mirrorX)
     {
         GLTFast.GltfImport.MirrorX = mirrorX;
@@ -190,7 +190,8 @@ static class Importing
         return found;
     }
 
-    /// <summary>Build a player of two scenes, of which one holds the specimen. Returns the streaming assets.</summary>
+    /// <summary>Build a player for each of two scenes; only the first has the specimen. Returns the streaming
+    /// assets.</summary>
     public static JToken Build(string folder)
     {
         Link(folder);

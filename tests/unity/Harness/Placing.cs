@@ -1,4 +1,4 @@
-// Heights of levels of detail, the order of blending, and the Inspector's line of a channel.
+// Returns the screen heights of levels of detail, the order of blending, and the Inspector's line for a channel.
 using System.Collections.Generic;
 using System.Linq;
 using Newtonsoft.Json.Linq;
@@ -16,7 +16,7 @@ static class Placing
         return new JArray(Placement.LodHeights(levels, double.Parse(args[2]), double.Parse(args[3]), double.Parse(args[4])));
     }
 
-    // Returns each box's place in the order of blending, for each eye; boxes are [[min, max], ...].
+    // Returns for each eye the sorting order of every box. Boxes are [[min, max], ...].
     public static JToken Sort(JArray corners, JArray eyes)
     {
         var root = new GameObject("specimen");
@@ -46,7 +46,7 @@ static class Placing
         return found;
     }
 
-    // Returns what the Inspector draws of a channel, once each field was clicked on.
+    // Returns the fields that the Inspector draws for a channel, and its values after a click on each field.
     public static JToken Drawer()
     {
         var channel = new Channel { name = "CD31", functions = new[] { "default", "sharp" } };

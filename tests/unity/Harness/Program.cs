@@ -1,4 +1,4 @@
-// Runs the package's own code with the stubs, and prints what it made as JSON.
+// Runs the package's code with the stubs, and prints the result as JSON.
 using System;
 using System.IO;
 using System.Reflection;
@@ -12,7 +12,7 @@ static class Program
     {
         try
         {
-            // Unity runs the constructors of [InitializeOnLoad] when the editor starts
+            // Unity runs the static constructors of [InitializeOnLoad] classes when the editor starts.
             System.Runtime.CompilerServices.RuntimeHelpers.RunClassConstructor(typeof(BundleWatcher).TypeHandle);
             System.Runtime.CompilerServices.RuntimeHelpers.RunClassConstructor(typeof(VolumeCache).TypeHandle);
             if (args[0] == "zstd") Unpacking.Unpack();
@@ -52,7 +52,7 @@ static class Program
         }
     }
 
-    /// <summary>Call what Unity calls by its name: Update, OnEnable, ...</summary>
+    /// <summary>Call a method that Unity calls by its name, such as Update or OnEnable.</summary>
     public static void Send(object component, string message)
     {
         component.GetType().GetMethod(message, BindingFlags.Instance | BindingFlags.NonPublic).Invoke(component, null);

@@ -1,11 +1,12 @@
-// What the package unpacks: zstd frames and KTX2 levels.
+// Unpacks zstd frames, KTX2 levels and voxel files with the package's code.
 using System;
 using System.IO;
 using StereoCell.Editor;
 
 static class Unpacking
 {
-    // Each frame on stdin has its bytes, its size unpacked, and itself. Each on stdout is 0 and the bytes, or 1.
+    // Standard input has the number of frames, then for each frame its length, its unpacked size and its bytes. Standard
+    // output has for each frame the byte 0 and the unpacked bytes, or the byte 1 if the frame is refused.
     public static void Unpack()
     {
         using (var input = new BinaryReader(Console.OpenStandardInput()))
@@ -37,7 +38,7 @@ static class Unpacking
         using (var output = Console.OpenStandardOutput()) output.Write(found.Texels, 0, found.Texels.Length);
     }
 
-    /// <summary>All slices of a file of voxels, as texels.</summary>
+    /// <summary>Print all slices of a voxel file as texels.</summary>
     public static void Voxels(string path)
     {
         using (var file = new StereoCell.VolumeFile(File.OpenRead(path)))

@@ -1,4 +1,4 @@
-// Volumes in memory: levels, residency, and where files lie.
+// Returns the importer's levels, the tiles that stay in memory, and the paths of voxel files.
 using System.Collections.Generic;
 using System.Linq;
 using Newtonsoft.Json.Linq;
@@ -8,7 +8,7 @@ using UnityEngine;
 
 static class Volumes
 {
-    /// <summary>The level that the importer takes of a tile's boxes, and the most memory that it takes then.</summary>
+    /// <summary>Return the level that the importer chooses for a tile's boxes, and its peak memory.</summary>
     public static JToken LevelFor(JObject asked)
     {
         var options = asked["options"].ToObject<ImportOptions>();
@@ -21,7 +21,8 @@ static class Volumes
             new JProperty("textures", sizes.Sum(size => VolumeMemory.TextureBytes(size.Key, size.Value))));
     }
 
-    /// <summary>Items [name, bytes] that are wanted one after another, with a budget of 100. Returns who leaves, and who stays.</summary>
+    /// <summary>Request items [name, bytes] one after another with a budget of 100 bytes. Returns for each request the
+    /// items that leave, the items that stay, and their bytes.</summary>
     public static JToken Residents(JArray wanted)
     {
         var residency = new Residency<string> { Budget = 100 };
@@ -34,7 +35,8 @@ static class Volumes
         return found;
     }
 
-    /// <summary>The path of a file in a player whose streaming assets lie at an address, at each look.</summary>
+    /// <summary>Check four times whether a voxel file is available in a player whose streaming assets lie at an address.
+    /// Returns the path and the error each time.</summary>
     public static JToken Place(string address, string file)
     {
         VolumePlace.Maker = null;

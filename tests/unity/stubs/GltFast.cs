@@ -1,5 +1,5 @@
-// Of glTFast (6.14, Apache-2.0) what the importer uses, by the same names. What it does with a .glb is imitated: an
-// object of the file's node, mirrored in x, with a renderer and a material. Loading waits, as the real one does.
+// Stub of the parts of glTFast (6.14, Apache-2.0) that the importer uses. Names are glTFast's own. Like glTFast, the stub
+// makes an object of the .glb's node, mirrored in x, with a renderer and a material. Loading is asynchronous, too.
 using System;
 using System.Text;
 using System.Threading;
@@ -25,8 +25,8 @@ namespace GLTFast
 
     public class GltfImport : IDisposable
     {
-        public static bool IsThere = true;  // of the stub: whether what the files need is in the project
-        public static float MirrorX = -1;  // 1: what another importer might do
+        public static bool IsThere = true;  // only in the stub: whether the project has the packages that the files need
+        public static float MirrorX = -1;  // only in the stub; 1 imitates an importer that does not mirror
         JObject json;
 
         public GltfImport(Loading.IDownloadProvider downloadProvider = null, IDeferAgent deferAgent = null, Materials.IMaterialGenerator materialGenerator = null, Logging.ICodeLogger logger = null) { }

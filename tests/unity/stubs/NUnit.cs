@@ -1,4 +1,4 @@
-// Of NUnit what the package's own tests use.
+// Stub of the parts of NUnit that the package's own tests use.
 using System;
 
 namespace NUnit.Framework

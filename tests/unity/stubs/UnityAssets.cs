@@ -1,5 +1,6 @@
-// UnityEditor's asset database, as its documentation has it: an asset is imported when it is new, when it or an asset
-// that it depends on changes, or when the hash that is registered for one of its custom dependencies changes.
+// Stub of UnityEditor's asset database. It follows Unity's documentation. An asset is imported when it is new, when it
+// changes, or when an asset that it depends on changes. It is also imported when the registered hash of one of its custom
+// dependencies changes.
 using System;
 using System.Collections.Generic;
 using System.IO;
@@ -42,8 +43,8 @@ namespace UnityEditor
         static readonly Dictionary<string, Hash128> registered = new Dictionary<string, Hash128>();
         static bool isImporting;
 
-        public static readonly Dictionary<string, string[]> Dependencies = new Dictionary<string, string[]>();  // of the stub: of scenes
-        public static readonly List<string> Log = new List<string>();  // of the stub: paths in the order in which they were imported
+        public static readonly Dictionary<string, string[]> Dependencies = new Dictionary<string, string[]>();  // only in the stub: of scenes
+        public static readonly List<string> Log = new List<string>();  // only in the stub: imported paths, in order
         public static AssetImportContext ContextOf(string path) { return assets[path].Context; }
 
         internal static AssetImporter ImporterOf(string path) { return assets.ContainsKey(path) ? assets[path].Importer : null; }
@@ -143,7 +144,7 @@ namespace UnityEditor.AssetImporters
 
     public class AssetImportContext
     {
-        public readonly SortedDictionary<string, Object> Objects = new SortedDictionary<string, Object>(StringComparer.Ordinal);  // of the stub
+        public readonly SortedDictionary<string, Object> Objects = new SortedDictionary<string, Object>(StringComparer.Ordinal);  // only in the stub
         public readonly List<string> CustomDependencies = new List<string>();
         public readonly List<string> SourceDependencies = new List<string>();
         public readonly List<string> Errors = new List<string>();

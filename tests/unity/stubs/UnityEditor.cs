@@ -1,5 +1,5 @@
-// Of UnityEditor what the package uses, likewise: drawing of fields, selection, prefabs, scenes, builds. The asset
-// database is in UnityAssets.cs.
+// Stub of the parts of UnityEditor that the package uses: drawing of fields, selection, prefabs, scenes and builds. The
+// asset database is in UnityAssets.cs.
 using System;
 using System.Collections.Generic;
 using System.Linq;
@@ -25,7 +25,7 @@ namespace UnityEditor
         public virtual void OnGUI(Rect position, SerializedProperty property, GUIContent label) { }
     }
 
-    /// <summary>A field of an object, by its name: FieldInfo under Unity's names.</summary>
+    /// <summary>A field of an object, found by its name. It offers a FieldInfo under Unity's names.</summary>
     public class SerializedProperty
     {
         readonly object owner;
@@ -48,7 +48,7 @@ namespace UnityEditor
 
     public sealed class EditorGUI
     {
-        public static readonly List<string> Drawn = new List<string>();  // of the stub
+        public static readonly List<string> Drawn = new List<string>();  // only in the stub
         public static GUIContent BeginProperty(Rect totalPosition, GUIContent label, SerializedProperty property) { return label; }
         public static void EndProperty() { }
         static readonly Stack<bool> changes = new Stack<bool>();
@@ -69,11 +69,12 @@ namespace UnityEditor
         }
     }
 
-    /// <summary>Fields of a window. A test says which of them a person changes, by their labels, and to what.</summary>
+    /// <summary>Draws fields of a window. A test sets the new values of fields by their labels, as if a user changed
+    /// them.</summary>
     public sealed class EditorGUILayout
     {
-        public static readonly List<string> Drawn = new List<string>();  // of the stub
-        public static readonly Dictionary<string, object> Changes = new Dictionary<string, object>();  // of the stub
+        public static readonly List<string> Drawn = new List<string>();  // only in the stub
+        public static readonly Dictionary<string, object> Changes = new Dictionary<string, object>();  // only in the stub
 
         static T Field<T>(string label, T value)
         {
@@ -142,7 +143,7 @@ namespace UnityEditor
         public delegate void CallbackFunction();
         public static CallbackFunction delayCall;
         public static event Action<bool> focusChanged;
-        public static void Focus() { if (focusChanged != null) focusChanged(true); }  // of the stub: a person comes back
+        public static void Focus() { if (focusChanged != null) focusChanged(true); }  // only in the stub: the user comes back to the editor
     }
 
     public sealed class CustomEditor : Attribute { public CustomEditor(Type inspectedType) { } }
@@ -173,7 +174,7 @@ namespace UnityEditor.Build
 
     public sealed class BuildPlayerContext
     {
-        public readonly List<string> Added = new List<string>();  // of the stub
+        public readonly List<string> Added = new List<string>();  // only in the stub
         public BuildPlayerOptions BuildPlayerOptions { get; set; }
         public void AddAdditionalPathToStreamingAssets(string directoryOrFile, string pathInStreamingAssets = null) { Added.Add(pathInStreamingAssets); }
     }
@@ -189,7 +190,7 @@ namespace UnityEditor.SceneManagement
 {
     public enum NewSceneSetup { EmptyScene, DefaultGameObjects }
     public enum NewSceneMode { Single, Additive }
-    public struct Scene { }  // UnityEngine.SceneManagement in Unity
+    public struct Scene { }  // in UnityEngine.SceneManagement in Unity
     public sealed class EditorSceneManager
     {
         public static bool SaveCurrentModifiedScenesIfUserWantsTo() { return true; }

@@ -1,6 +1,6 @@
-// Of UnityEngine what the package uses, with the signatures of Unity's published reference source
-// (UnityCsReference, 6000.7): code that compiles with these compiles with the editor's. They do as much as
-// it takes to run the importer: a tree of objects with places, and components that remember what they are given.
+// Stub of the parts of UnityEngine that the package uses. Signatures are those of Unity's published reference source
+// (UnityCsReference, 6000.7), so code that compiles with the stub also compiles in the editor. The stub does only what
+// the importer needs: a tree of objects with positions, and components that store the values they are given.
 using System;
 using System.Collections.Generic;
 using System.Linq;
@@ -56,7 +56,7 @@ namespace UnityEngine
 
     public sealed class GameObject : Object
     {
-        public static readonly List<GameObject> All = new List<GameObject>();  // of the stub
+        public static readonly List<GameObject> All = new List<GameObject>();  // only in the stub
         readonly List<Component> components = new List<Component>();
         public GameObject(string name)
         {
@@ -128,7 +128,7 @@ namespace UnityEngine
             var at = parent == null ? position : parent.InverseTransformPoint(position);
             return new Vector3((at.x - localPosition.x) / localScale.x, (at.y - localPosition.y) / localScale.y, (at.z - localPosition.z) / localScale.z);
         }
-        public Vector3 TransformPoint(Vector3 position)  // no turns here
+        public Vector3 TransformPoint(Vector3 position)  // the stub has no rotations
         {
             var at = new Vector3(localPosition.x + localScale.x * position.x, localPosition.y + localScale.y * position.y, localPosition.z + localScale.z * position.z);
             return parent == null ? at : parent.TransformPoint(at);
@@ -206,7 +206,7 @@ namespace UnityEngine
 
     public class Renderer : Component
     {
-        public SortedDictionary<string, object> Block;  // of the stub: a copy, as Unity makes one
+        public SortedDictionary<string, object> Block;  // only in the stub: a copy of the block, as in Unity
         public Renderer() { enabled = true; }
         public bool enabled { get; set; }
         public Bounds bounds
@@ -222,7 +222,7 @@ namespace UnityEngine
         public Rendering.ShadowCastingMode shadowCastingMode { get; set; }
         public Material sharedMaterial { get; set; }
         Material instance;
-        public Material material  // an instance of the renderer's own, as Unity makes one
+        public Material material  // makes the renderer's own copy, as in Unity
         {
             get
             {
@@ -282,7 +282,7 @@ namespace UnityEngine
     public class Physics
     {
         public const int DefaultRaycastLayers = ~(1 << 2);
-        public static Collider Ahead;  // of the stub: what any ray hits
+        public static Collider Ahead;  // only in the stub: the collider that every ray hits
         public static bool Raycast(Vector3 origin, Vector3 direction, out RaycastHit hitInfo, float maxDistance, int layerMask, QueryTriggerInteraction queryTriggerInteraction)
         {
             hitInfo = new RaycastHit { collider = Ahead };
@@ -320,7 +320,7 @@ namespace UnityEngine
     public sealed class AddComponentMenu : Attribute { public AddComponentMenu(string menuName) { } }
     [AttributeUsage(AttributeTargets.Class, AllowMultiple = true)] public sealed class RequireComponent : Attribute
     {
-        public readonly Type[] Types;  // of the stub
+        public readonly Type[] Types;  // only in the stub
         public RequireComponent(Type requiredComponent) { Types = new[] { requiredComponent }; }
         public RequireComponent(Type requiredComponent, Type requiredComponent2) { Types = new[] { requiredComponent, requiredComponent2 }; }
     }

@@ -1,4 +1,4 @@
-// Numbers of UnityEngine: vectors, boxes, colours.
+// Stub of UnityEngine's vectors, boxes and colours.
 using System;
 
 namespace UnityEngine

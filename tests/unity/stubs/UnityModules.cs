@@ -1,4 +1,4 @@
-// Modules of UnityEngine that the package uses: application, input, web requests, XR, curves.
+// Stub of UnityEngine's modules that the package uses: application, input, web requests, XR and curves.
 using System;
 using System.Collections.Generic;
 using System.IO;
@@ -6,11 +6,11 @@ using System.Linq;
 
 namespace UnityEngine
 {
-    public delegate void UnityAction();  // UnityEngine.Events in Unity
+    public delegate void UnityAction();  // in UnityEngine.Events in Unity
 
     public class Debug
     {
-        public static readonly List<string> Errors = new List<string>();  // of the stub
+        public static readonly List<string> Errors = new List<string>();  // only in the stub
         public static void LogError(object message, Object context) { Errors.Add((string)message); }
     }
 
@@ -28,7 +28,7 @@ namespace UnityEngine
 
     public class Input
     {
-        public static bool Pressed;  // of the stub
+        public static bool Pressed;  // only in the stub
         public static bool GetMouseButtonDown(int button) { return Pressed && button == 0; }
     }
 
@@ -55,7 +55,8 @@ namespace UnityEngine
         }
     }
 
-    /// <summary>Hermite pieces between keys; an infinite tangent holds the value, as Unity documents.</summary>
+    /// <summary>A curve of Hermite pieces between keys. An infinite tangent keeps the key's value, as Unity
+    /// documents.</summary>
     public class AnimationCurve
     {
         public Keyframe[] keys { get; set; }
@@ -101,7 +102,7 @@ namespace UnityEngine
             this.colorKeys = colorKeys;
             this.alphaKeys = alphaKeys;
         }
-        public Color Evaluate(float time)  // of one colour here
+        public Color Evaluate(float time)  // the stub uses only the first colour
         {
             var color = colorKeys[0].color;
             var curve = new AnimationCurve(alphaKeys.Select(key => new Keyframe(key.time, key.alpha, 0, 0)).ToArray());
@@ -129,13 +130,14 @@ namespace UnityEngine.Networking
     public class DownloadHandler : IDisposable { public void Dispose() { } }
     public sealed class DownloadHandlerFile : DownloadHandler
     {
-        public readonly string Path;  // of the stub
+        public readonly string Path;  // only in the stub
         public DownloadHandlerFile(string path) { Path = path; }
     }
     public class UploadHandler { }
     public class UnityWebRequestAsyncOperation { }
 
-    /// <summary>Android's addresses jar:file://... are files here; a request is done at the second look.</summary>
+    /// <summary>Reads Android's addresses jar:file://... as files. A request is done when it is checked for the second
+    /// time.</summary>
     public class UnityWebRequest : IDisposable
     {
         public enum Result { InProgress, Success, ConnectionError, ProtocolError, DataProcessingError }

@@ -1,5 +1,5 @@
-// Textures of UnityEngine, and of what they take memory: the stub adds up the bytes that are held, in main memory and
-// on the GPU, so that a test can compare them with the bound that the package computes.
+// Stub of UnityEngine's textures. It adds up the bytes of all textures in main memory and on the GPU, so that a test can
+// compare them with the limit that the package computes.
 using System;
 using System.Linq;
 using Unity.Collections;
@@ -10,13 +10,13 @@ namespace UnityEngine
 {
     public class Texture : Object
     {
-        public static long HeldBytes, MostBytes;  // of the stub: of all textures now, and the most at any time
+        public static long HeldBytes, MostBytes;  // only in the stub: bytes of all textures now, and their maximum
         long held;
         public virtual int width { get; set; }
         public virtual int height { get; set; }
         public TextureWrapMode wrapMode { get; set; }
         public FilterMode filterMode { get; set; }
-        public byte[] Data;  // of the stub: the texels
+        public byte[] Data;  // only in the stub: the texels
         public string Format;
         protected void Hold(long bytes)
         {
@@ -111,7 +111,7 @@ namespace UnityEngine
 
     public class Graphics
     {
-        public static long CopiedBytes;  // of the stub
+        public static long CopiedBytes;  // only in the stub
         public static void CopyTexture(Texture src, int srcElement, int srcMip, Texture dst, int dstElement, int dstMip)
         {
             if (src.Format != dst.Format || src.width != dst.width || src.height != dst.height) throw new ArgumentException("textures that differ");
@@ -122,7 +122,7 @@ namespace UnityEngine
 
     public sealed class SystemInfo
     {
-        public static CopyTextureSupport copyTextureSupport { get; set; }  // Unity's can't be set
+        public static CopyTextureSupport copyTextureSupport { get; set; }  // read-only in Unity
     }
 }
 
@@ -139,7 +139,7 @@ namespace UnityEngine.Rendering
     public class RenderPipelineAsset : Object { }
     public sealed class GraphicsSettings
     {
-        public static RenderPipelineAsset currentRenderPipeline { get; set; }  // Unity's can't be set
+        public static RenderPipelineAsset currentRenderPipeline { get; set; }  // read-only in Unity
     }
 }
 

@@ -1,5 +1,5 @@
-// The names that the package's shaders take of Unity's own include, to compile them without Unity.
-// The matrices are the mono ones; with UNITY_STEREO_INSTANCING_ENABLED those of an eye, by instance.
+// Stub of the names from Unity's own include that the package's shaders use, to compile them without Unity.
+// The matrices are those of one camera. With UNITY_STEREO_INSTANCING_ENABLED, they are those of the instance's eye.
 #define CBUFFER_START(name) cbuffer name {
 #define CBUFFER_END };
 #define UNITY_BRANCH [branch]

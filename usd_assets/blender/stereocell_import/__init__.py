@@ -1,13 +1,16 @@
-"""Blender add-on: import a StereoCell stage as it is meant, export the edits as a USD layer.
+"""Blender add-on that imports a StereoCell stage with its materials and exports edits as a layer.
 
-Blender's own importer has no way to choose variants, drops the materials of volumes, doesn't follow
-an edited colour to the material's interface and doesn't read lists of numbers. So this add-on
-chooses before the import, in a layer over the stage (choice.py), lets Blender import it, and builds
-what is missing from the stage's attributes (looks.py, cameras.py). overlay.py writes what the
-artist changed as a layer over the stage, which `stereocell bundle OUT --stage LAYER` takes. A label
-map's objects have a panel beside the 3D view (objects.py).
+Blender's own importer cannot choose variants, drops the materials of volumes, ignores a colour that
+was edited at the material's interface, and does not read lists of numbers. This add-on therefore
+works in three steps. It selects variants in a layer over the stage (choice.py). It lets Blender
+import that layer. It builds the missing materials and cameras from the stage's attributes
+(looks.py, cameras.py).
 
-Blender 4.5 or newer. 1 unit is 1 um, or the specimen has its true size.
+overlay.py writes the artist's edits as a layer over the stage, for `stereocell bundle OUT --stage
+LAYER`. The objects of a label map have a panel beside the 3D view (objects.py).
+
+The add-on needs Blender 4.5 or newer. One Blender unit is 1 um, or 1 m if the specimen is imported
+at its true size or enlarged to its display size.
 """
 
 import bpy
@@ -143,6 +146,7 @@ def _export_entry(menu, _context):
 
 
 def register():
+    """Register the add-on's classes and menu entries; Blender calls this."""
     bpy.utils.register_class(ImportStereoCellStage)
     bpy.utils.register_class(ExportStereoCellEdits)
     for one in CLASSES:
@@ -152,6 +156,7 @@ def register():
 
 
 def unregister():
+    """Remove the add-on's classes and menu entries; Blender calls this."""
     bpy.types.TOPBAR_MT_file_export.remove(_export_entry)
     bpy.types.TOPBAR_MT_file_import.remove(_import_entry)
     for one in reversed(CLASSES):

@@ -1,7 +1,8 @@
-"""Write what an artist added to the scene: meshes, curves, texts, cameras and lights.
+"""Write objects that an artist added to the scene: meshes, curves, texts, cameras and lights.
 
 `stereocell bundle` takes meshes as layers of the viewer, cameras as its views, and suns and points
-as its lamps. Whatever has a surface becomes triangles, with modifiers applied, at this frame.
+as its lamps. Each object that has a surface becomes triangles: its shape at the current frame, with
+its modifiers applied.
 """
 
 import math
@@ -24,9 +25,10 @@ _Types = Sdf.ValueTypeNames
 
 
 def write_additions(context, layer, stage, root, strangers, lost):
-    """Yield what is written of the objects that the specimen did not have; `lost` gets the rest.
+    """Write the objects that were not imported, and yield one line for each that was written.
 
-    Hidden objects are left out, and so are empties, which hold others.
+    Reasons why an object, or a property of one, is not written are appended to `lost`. Hidden
+    objects and empties, which only group other objects, are skipped.
     """
     to_stage = root.matrix_world.inverted()
     names = _Names(layer, stage)
@@ -59,13 +61,16 @@ def write_additions(context, layer, stage, root, strangers, lost):
 
 
 class _Names:
-    """Defines prims of names that neither the layer nor the stage has."""
+    """Defines prims whose paths exist neither in the layer nor in the stage."""
 
     def __init__(self, layer, stage):
         self._layer, self._stage = layer, stage
 
     def define(self, group, kind, name):
-        """Define a prim of a name like an object's, which is its display name; return its path."""
+        """Define a prim in a group, with the object's name as its display name; return its path.
+
+        Characters that USD does not allow become underscores. A name in use gets a number.
+        """
         legal = re.sub(r"\W", "_", name, flags=re.ASCII)
         legal = f"_{legal}" if not legal or legal[0].isdigit() else legal
         path, number = f"{group}/{legal}", 1
@@ -96,7 +101,7 @@ def _write_surface(context, layer, block, matrix, names, lost):
     slots = {slot.material.name for slot in block.material_slots if slot.material}
     evaluated.to_mesh_clear()
     rows = np.array(matrix)
-    if np.linalg.det(rows[:3, :3]) < 0:  # mirrored: the other side is the outer one
+    if np.linalg.det(rows[:3, :3]) < 0:  # mirroring turns the faces over
         vertices, normals = vertices[:, ::-1], normals[:, ::-1]
     points = points @ rows[:3, :3].T + rows[:3, 3]
     normals = normals @ np.linalg.inv(rows[:3, :3])
@@ -120,7 +125,7 @@ def _write_surface(context, layer, block, matrix, names, lost):
 
 
 def _write_material(layer, path, block, lost):
-    """Give a mesh the plain values of its first material, or a grey one."""
+    """Give a mesh the plain values of its first material; without a material, write none."""
     materials = [slot.material for slot in block.material_slots if slot.material]
     if not materials:
         return
@@ -166,7 +171,7 @@ def _write_camera(context, layer, block, matrix, names, lost):
     fit = camera.sensor_fit
     if fit == "VERTICAL":
         vertical = camera.sensor_height
-    else:  # AUTO: the sensor's width is the picture's longer edge
+    else:  # AUTO fits the sensor's width to the longer edge of the frame
         is_wide = fit == "HORIZONTAL" or width >= height
         vertical = camera.sensor_width * (height / width if is_wide else 1.0)
     for name, is_set in (
@@ -217,7 +222,7 @@ def _write_light(layer, block, matrix, names, lost):
 
 
 def _place(layer, path, matrix):
-    """Put a prim where an object is; its scale is left out, which cameras and lights ignore."""
+    """Write an object's position and rotation; cameras and lights ignore its scale."""
     place = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), None)
     rows = [[round(float(v), 6) for v in row] for row in place.transposed()]
     set_value(layer, path, "xformOp:transform", _Types.Matrix4d, Gf.Matrix4d(rows))

@@ -1,13 +1,16 @@
-"""Make the stage's cameras a stereo pair of Blender's: one camera, two eyes, off-axis."""
+"""Turn the stage's cameras into one stereo camera of Blender, with two off-axis eyes."""
 
 from .choice import ROOT
 
 
 def pair_cameras(scene, stage, objects, scale, is_stereo):
-    """Look through `mono` with the eyes of `left` and `right`, whose ranges become the scene's.
+    """Make `mono` the scene's camera, with the eye distance of `left` and `right`.
+
+    The clip distances of all cameras are scaled to Blender's units. Without `left`, `right` or a
+    focus distance, the camera's stereo settings stay as they are.
 
     objects    Blender's objects by the path of their prim
-    scale      Blender's units for a unit of the stage
+    scale      Blender units in one unit of the stage
     is_stereo  whether both eyes are rendered
     """
     for block in objects.values():

@@ -1,4 +1,4 @@
-"""Choose tiles and variants of a stage by a layer over it, since Blender's importer can't."""
+"""Select tiles and variants of a stage in a layer over it; Blender's importer cannot."""
 
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -12,15 +12,15 @@ AS_STAGED = "AS_STAGED"
 ROOT = "/Specimen"
 TILES = f"{ROOT}/Tiles"
 CHANNELS = f"{ROOT}/Channels"
-SHOWN = f"{ROOT}/Shown"  # a prim for each channel, whose visibility holds in all tiles
+SHOWN = f"{ROOT}/Shown"  # has a prim for each channel, with its visibility in all tiles
 ALL = "ALL"
 METERS_PER_UNIT = 1e-6
-DISPLAY_SCALE = "stereocell:displayScale"  # on /Specimen: lengths at display size for one of its
+DISPLAY_SCALE = "stereocell:displayScale"  # on /Specimen: enlargement at display size
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What is to be imported. AS_STAGED leaves a variant as the stage selects it.
+    """The parts of a stage to import. AS_STAGED keeps the variant that the stage selects.
 
     tiles  names or patterns with * and ?, separated by commas
     """
@@ -29,11 +29,14 @@ class Choice:
     lod: str = AS_STAGED
     representation: str = AS_STAGED
     transfer_function: str = AS_STAGED
-    channels: str = AS_STAGED  # ALL: also those that the stage does not show
+    channels: str = AS_STAGED  # ALL imports also the channels that the stage hides
 
 
 def open_stage(path):
-    """Open a StereoCell stage without its payloads. Raises StageProblem if it is none."""
+    """Open a StereoCell stage without its payloads.
+
+    Raises StageProblem if the file is not a StereoCell stage, or has another unit or up axis.
+    """
     try:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
     except Tf.ErrorException as error:
@@ -64,11 +67,11 @@ def shared_functions(stage):
 
 
 def write_choice(stage, choice, file):
-    """Write a layer over a stage that selects what was chosen.
+    """Write a layer over a stage that selects the chosen tiles, variants and channels.
 
-    Return the variants of the chosen tiles as the stage selects them, by tile and variant set.
+    Return the stage's own variant selections of the chosen tiles, by tile and variant set.
 
-    Raises StageProblem if no tile fits, or a channel lacks the transfer function.
+    Raises StageProblem if no tile matches, or if a channel lacks the transfer function.
     """
     # A tile that the stage deactivates can't be loaded, and stays deactivated.
     tiles = stage.GetPrimAtPath(TILES).GetFilteredChildren(Usd.PrimIsActive & Usd.PrimIsDefined)
@@ -127,7 +130,10 @@ def _some_names(tiles):
 
 
 def _variant(tile, variant_set, wanted):
-    """Return the variant to select; None leaves it. A level too coarse is the coarsest there is."""
+    """Return the variant to select, or None to keep the stage's selection.
+
+    If the tile does not have the wanted level of detail, its coarsest one is returned.
+    """
     known = sorted(tile.GetVariantSet(variant_set).GetVariantNames())
     if wanted == AS_STAGED or not known:
         return None

@@ -1,8 +1,8 @@
-"""Import a stage through Blender's own importer, and finish what that leaves undone.
+"""Import a stage through Blender's own importer, and add the parts that it leaves out.
 
-What was imported, and how it was then, is kept in custom properties, so that the edits are known
-when they are exported: on the root object `stereocell` (JSON) and each channel's colour group and
-volume material; on every other object the path of its prim.
+Custom properties record the state at the import, so that the export can find the edits. The root
+object has `stereocell` (JSON), and each channel's colour group and volume material. Every object
+has the path of its prim.
 """
 
 import json
@@ -32,12 +32,12 @@ STATE = "stereocell"
 PRIM = "stereocell_prim"
 COLOR = "stereocell_color_"
 VOLUME = "stereocell_volume_"
-PAINTED = "stereocell:paintedBy"  # of a channel: which other is painted on its surface
-COLUMNS = "stereocell:columns"  # of a label map's channel, whose objects have colours
+PAINTED = "stereocell:paintedBy"  # on a channel: the channel that is painted on its surface
+COLUMNS = "stereocell:columns"  # on a label map's channel: its table columns
 
 
 class _Hook(bpy.types.USDHook):
-    """Hands over the composed stage and what Blender made of its prims."""
+    """Passes `finish` the composed stage and the objects that Blender made of its prims."""
 
     bl_idname = "stereocell_import_hook"
     bl_label = "StereoCell"
@@ -51,11 +51,11 @@ class _Hook(bpy.types.USDHook):
 
 
 def import_stage(context, path, choice, size=MICROMETRES, is_lit=True, is_stereo=False):
-    """Import what was chosen of a stage; return the object of /Specimen. Raises StageProblem.
+    """Import the chosen parts of a stage; return the object of /Specimen. Raises StageProblem.
 
-    size       MICROMETRES: a unit is 1 um; TRUE: 1 m; DISPLAY: 1 m, and the specimen is enlarged
-    is_lit     whether the scene gets the stage's lights and what else a good picture takes
-    is_stereo  whether pictures are rendered for both eyes
+    size       MICROMETRES: one unit is 1 um; TRUE: 1 m; DISPLAY: 1 m, with an enlarged specimen
+    is_lit     whether to add the stage's lights and backdrop, and to set up rendering
+    is_stereo  whether images are rendered for both eyes
     """
     stage = open_stage(path)
     scale = _scale_of(stage, size)
@@ -119,7 +119,10 @@ def import_stage(context, path, choice, size=MICROMETRES, is_lit=True, is_stereo
 
 
 def describe_size(stage):
-    """Return a stage's physical size in words, by the boxes of its tiles, loaded or not."""
+    """Return a stage's size in words, such as "1 x 2 x 3 mm", from its tiles' bounding boxes.
+
+    The tiles need not be loaded.
+    """
     purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
     boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), purposes, True)
     edges = boxes.ComputeWorldBound(stage.GetPrimAtPath(TILES)).ComputeAlignedRange().GetSize()
@@ -129,7 +132,10 @@ def describe_size(stage):
 
 
 def _scale_of(stage, size):
-    """Return Blender's units for a unit of the stage. Raises StageProblem."""
+    """Return the number of Blender units in one unit of the stage.
+
+    Raises StageProblem if the stage states no display scale and `size` is DISPLAY.
+    """
     if size == MICROMETRES:
         return 1.0
     if size == TRUE:
@@ -143,7 +149,10 @@ def _scale_of(stage, size):
 
 
 def _finish(context, stage, prim_map, scale, is_stereo):
-    """Build the looks and cameras; return the root object and the state to be compared with."""
+    """Build the channels' materials and the cameras.
+
+    Return the root object and the state that an export compares the scene with.
+    """
     objects = _objects_of(prim_map)
     for path, block in objects.items():
         block[PRIM] = path
@@ -190,9 +199,9 @@ def _finish(context, stage, prim_map, scale, is_stereo):
 
 
 def _name_blocks(channel, shown, blocks):
-    """Name what Blender made of a channel's prims by the name that the channel shows.
+    """Give the objects and materials of a channel its display name.
 
-    Names of prims can't have spaces, slashes or a leading digit, so theirs are encoded.
+    Names of prims cannot have spaces, slashes or a leading digit, so the stage encodes them.
     """
     if shown == channel:
         return
@@ -215,16 +224,17 @@ def _objects_of(prim_map):
 
 
 def matrix_of(path, objects):
-    """Return the matrix of a prim's object below that of the prim above it, in the stage's units.
+    """Return an object's matrix relative to its nearest ancestor in `objects`, in stage units.
 
-    Rows, for column vectors. `objects`: Blender's by the paths of their prims, /Specimen's too.
+    The result is a list of rows, for column vectors. `objects` holds Blender's objects by the
+    paths of their prims, including /Specimen.
     """
     block, above = objects[path], path.rpartition("/")[0]
     while above not in objects:
         above = above.rpartition("/")[0]
     frame = objects[above]
     if block.parent == frame and block.parent_type == "OBJECT" and not block.constraints:
-        # not through the world, whose floats have 32 bits
+        # The world matrices have 32-bit floats, so going through them would lose precision.
         return [list(row) for row in block.matrix_parent_inverse @ block.matrix_basis]
     return [list(row) for row in frame.matrix_world.inverted() @ block.matrix_world]
 
@@ -261,7 +271,7 @@ def _color_surfaces(stage, channel, look, group, materials):
             continue
         source = stage.GetPrimAtPath(f"{CHANNELS}/{channel}")
         if source.GetAttribute(PAINTED).Get() or source.GetAttribute(COLUMNS).Get():
-            continue  # Blender itself feeds the image, the mesh's own colours, or those of classes
+            continue  # Blender's importer already connects the image or the mesh's own colours
         own = prim.GetAttribute("inputs:color").Get()
         if own is None or list(own) == look["color"]:
             color_surface(material, group)

@@ -1,8 +1,9 @@
-"""Light an imported stage by its own lights, and set the scene so that a render is a good picture.
+"""Light an imported stage with its own lights, and prepare the scene for rendering.
 
 Blender's importer makes the lights and the world. It makes distant lights four times as bright as
 USD defines them, so their strength is set here. The camera sees a plain dark backdrop in place of
-the dome's image. Objects of the startup scene would stand inside the specimen: they are hidden.
+the dome's image. The cube and the lamp of the startup scene are hidden: they would stand inside the
+specimen.
 """
 
 import bpy
@@ -10,9 +11,9 @@ import bpy
 from .choice import ROOT
 
 BACKDROP = (0.0033, 0.0040, 0.0060)  # linear; the background of the web viewer
-SAMPLES = 64  # of a picture by Cycles; its noise is removed
+SAMPLES = 64  # samples per pixel of a Cycles render, which is denoised afterwards
 _WORLD = "StereoCell studio"
-_DOMES = ("DomeLight", "DomeLight_1")  # USD's names of the type
+_DOMES = ("DomeLight", "DomeLight_1")  # USD's type names
 _STARTUP_LAMP_W = 1000.0
 
 
@@ -22,7 +23,7 @@ def begin_world(scene):
 
 
 def end_world(scene, before):
-    """Give the scene the world back that it had."""
+    """Remove the scene's world, and give the scene its earlier world back."""
     bpy.data.worlds.remove(scene.world)
     scene.world = before
 
@@ -31,7 +32,7 @@ def light_scene(scene, stage, objects, before):
     """Set lights, world, colours and renderer after an import.
 
     objects  Blender's objects by the path of their prim
-    before   the world that the scene had: it comes back if the stage has no dome
+    before   the scene's earlier world, which is restored if the stage has no dome light
     """
     _set_strengths(stage, objects)
     if any(prim.GetTypeName() in _DOMES for prim in stage.Traverse()):
@@ -47,7 +48,7 @@ def light_scene(scene, stage, objects, before):
 
 
 def _set_strengths(stage, objects):
-    """Give each sun the irradiance that USD defines: its intensity, where that is normalized."""
+    """Set each sun to the irradiance that USD defines: the intensity of a normalized light."""
     for path, block in objects.items():
         prim = stage.GetPrimAtPath(path)
         if block.type != "LIGHT" or block.data.type != "SUN" or not prim:
@@ -61,13 +62,13 @@ def _set_strengths(stage, objects):
 
 
 def light_values(block):
-    """Return a light's strength and its colour, to be compared with those of the import."""
+    """Return a light's strength and linear colour; an export compares them with the import's."""
     exposure = getattr(block.data, "exposure", 0.0)
     return [block.data.energy * 2**exposure, *color_of_light(block.data)]
 
 
 def color_of_light(light):
-    """Return a light's linear colour, that of its temperature included."""
+    """Return a light's linear colour, multiplied by the colour of its temperature."""
     color = list(light.color)
     if getattr(light, "use_temperature", False):
         color = [a * b for a, b in zip(color, light.temperature_color, strict=True)]
@@ -75,13 +76,16 @@ def color_of_light(light):
 
 
 def intensity_of(prim, energy, before):
-    """Return the intensity of a light in the stage whose strength in Blender was `before`."""
+    """Return the stage's intensity for a light that now has the strength `energy` in Blender.
+
+    `before` is its strength in Blender at the import.
+    """
     known = prim.GetAttribute("inputs:intensity").Get()
     return known * energy / before if before > 0 else energy
 
 
 def _separate_backdrop(world):
-    """Show the camera a plain backdrop instead of the dome."""
+    """Show the camera a plain backdrop in place of the dome, which still lights the scene."""
     tree = world.node_tree
     output = next((n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputWorld"), None)
     if output is None or not output.inputs["Surface"].links:
@@ -121,10 +125,10 @@ def _is_startup_lamp(block):
 
 
 def _choose_cycles(scene):
-    """Choose the renderer that draws dense volumes, with settings for minutes, not hours.
+    """Choose Cycles, which draws dense volumes, with settings that take minutes, not hours.
 
-    `volume_biased` of Blender 5 stays off. It would begin at once instead of after 20 s, but leaves
-    gaps along the cuts between tiles, where the volumes of several channels overlap.
+    `volume_biased` of Blender 5 stays off. With it, a render starts at once instead of after 20 s,
+    but has gaps along the cuts between tiles, where the volumes of several channels overlap.
     """
     scene.render.engine = "CYCLES"
     scene.cycles.samples = SAMPLES
@@ -134,7 +138,7 @@ def _choose_cycles(scene):
 
 
 def _look_through_camera(scene, objects):
-    """Show the camera's view in all 3D views, with clip planes that the specimen fits between."""
+    """Show the camera's view in all 3D views, with the camera's clip distances."""
     camera = objects.get(f"{ROOT}/Cameras/mono")
     if camera is None or scene.camera != camera:
         return

@@ -1,16 +1,16 @@
-"""Build what Blender's importer leaves out of a channel's look: its colour and its volume shader.
+"""Build the colour and the volume shader of a channel, which Blender's importer drops.
 
-Each channel has one node group with its colour, which all of its materials use, of meshes and of
-volumes: recolouring is done there, in one place, as in the stage. Blender's own importer gives each
-material the plain value of its shader, which is the colour that was built.
+Each channel has one node group with its colour. All of its mesh and volume materials use this
+group, so a channel is recoloured in one place, as in the stage. Blender's own importer gives each
+material the plain value of its shader instead: the colour at the time of the build.
 
-Each channel has one volume material, whose colour ramp is the transfer function: positions are
+Each channel has one volume material. Its colour ramp is the transfer function: positions are
 intensities, alphas are opacities.
 
-An opacity holds for one voxel of the volume, as it does in the bundle's viewer: the extinction per
-um is -ln(1 - opacity) / voxel. Blender keeps densities in object space, so that a scaled specimen
-looks alike. Voxels glow as a fluorescent stain does, except those of MR and CT: there a glow would
-drown the shading of a body that is opaque.
+An opacity holds for the length of one voxel, as in the bundle's viewer: the extinction per um is
+-ln(1 - opacity) / voxel. Blender measures densities in object space, so a scaled specimen looks the
+same. Voxels glow as a fluorescent stain does. Volumes of MR and CT do not: a glow would drown the
+shading of opaque tissue.
 """
 
 import math
@@ -19,10 +19,10 @@ import bpy
 
 from .problem import StageProblem
 
-GLOW = 0.4  # emission for the same density of absorption
+GLOW = 0.4  # emission per density of absorption
 _MODALITIES_LIT = ("MR", "CT")  # DICOM's codes of the modalities whose volumes do not glow
-_MAX_POINTS = 32  # a ramp of Blender's holds no more
-_MIN_PASSED = 0.001  # what light always passes of a voxel: an opacity of 1 has no logarithm
+_MAX_POINTS = 32  # Blender's limit for the points of a colour ramp
+_MIN_PASSED = 0.001  # least transmission of a voxel, 0..1; an opacity of 1 has no logarithm
 
 
 def make_color_group(channel, color, opacity=1.0):
@@ -61,9 +61,9 @@ def opacity_of(group):
 
 
 def plain_values(material):
-    """Return the values of a material as inputs of a UsdPreviewSurface, and which have an image.
+    """Return a material's values as inputs of a UsdPreviewSurface, and the inputs that have images.
 
-    Colours are linear RGB, 0..1.
+    Colours are linear RGB, 0..1. Values that other nodes calculate count as images.
     """
     found = {"diffuseColor": tuple(material.diffuse_color)[:3], "roughness": material.roughness}
     found["metallic"] = material.metallic
@@ -81,7 +81,7 @@ def plain_values(material):
         source = socket.links[0].from_node if socket.links else None
         group = getattr(source, "node_tree", None)
         if group is not None and name == "diffuseColor":
-            found[name] = color_of(group)  # a channel's, of a copied surface
+            found[name] = color_of(group)  # a copied surface keeps its channel's group
         elif group is not None and name == "opacity":
             found[name] = opacity_of(group)
         elif source is not None:
@@ -98,21 +98,21 @@ def plain_values(material):
 
 
 def _at_most_1(color):
-    """Return a colour of the same hue whose largest part is 1 at most, as a bundle has it."""
+    """Return a colour of the same hue whose components are at most 1, the limit of a bundle."""
     return tuple(part / max(1.0, *color) for part in color)
 
 
 def color_surface(material, group):
-    """Feed a channel's colour to a material that Blender made of a UsdPreviewSurface."""
+    """Connect a channel's colour and opacity to a material that Blender's importer made."""
     tree = material.node_tree
     for surface in [node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled"]:
         node = _feed(tree, group, surface, "Base Color")
         tree.links.new(node.outputs["Opacity"], surface.inputs["Alpha"])
-    material.diffuse_color = (*color_of(group), 1.0)  # what a viewport without shading shows
+    material.diffuse_color = (*color_of(group), 1.0)  # the colour in viewports without shading
 
 
 def set_surface_color(material, color):
-    """Give a material a colour of its own: a tile's that an artist set apart from its channel's."""
+    """Give a tile's material its own colour, where the stage overrides the channel's colour."""
     for node in material.node_tree.nodes:
         if node.bl_idname == "ShaderNodeBsdfPrincipled":
             node.inputs["Base Color"].default_value = (*color, 1.0)
@@ -120,17 +120,18 @@ def set_surface_color(material, color):
 
 
 def glow_of(modality):
-    """Return the emission of a modality's volumes for the same density of absorption."""
+    """Return the emission of a modality's volumes, per density of absorption."""
     return 0.0 if modality in _MODALITIES_LIT else GLOW
 
 
 def make_volume_material(channel, group, look, voxel_um, glow):
     """Return the material of a channel's volumes.
 
-    look  its `points`, the transfer function as `fit_ramp` returns it: pairs of intensity and
-          opacity, 0..1, intensities rising; and its `windows`: voxel values that are shown as 0
-          and 1, and those that are 0 and 1 in the volumes
-    glow  emission for the same density of absorption
+    look      `points` is the transfer function from `fit_ramp`: pairs of intensity and opacity,
+              0..1, by rising intensity; `windows` is the pair of voxel values that are shown as 0
+              and 1, then the pair of voxel values that the volumes store as 0 and 1
+    voxel_um  shortest voxel edge of the channel's volumes, um
+    glow      emission per density of absorption
     """
     points, windows = look["points"], look["windows"]
     material = bpy.data.materials.new(f"{channel} volume")
@@ -155,7 +156,7 @@ def make_volume_material(channel, group, look, voxel_um, glow):
     emission = _math(tree, "MULTIPLY", 300, density, glow)
 
     shader = _node(tree, "ShaderNodeVolumePrincipled", 500)
-    shader.inputs["Density Attribute"].default_value = ""  # the ramp's, and not the grid's
+    shader.inputs["Density Attribute"].default_value = ""  # use the ramp's density, not the grid's
     tree.links.new(density, shader.inputs["Density"])
     tree.links.new(emission, shader.inputs["Emission Strength"])
     _feed(tree, group, shader, "Color", "Emission Color")
@@ -165,10 +166,10 @@ def make_volume_material(channel, group, look, voxel_um, glow):
 
 
 def fit_ramp(points):
-    """Return a transfer function with no more points than a colour ramp of Blender holds.
+    """Return a transfer function with at most as many points as Blender's colour ramp can hold.
 
-    While there are more, the inner point goes that changes the area below the function least
-    (Visvalingam and Whyatt, 1993).
+    Inner points are removed one by one. The next one is always the point whose removal changes the
+    area below the function least (Visvalingam and Whyatt, 1993).
     """
     kept = [list(point) for point in points]
     while len(kept) > _MAX_POINTS:
@@ -178,7 +179,7 @@ def fit_ramp(points):
 
 
 def _triangle_area(one, middle, other):
-    """Return the area by which a function changes where it goes straight from one to other."""
+    """Return the change of area below a function when its middle point is removed."""
     (x0, y0), (x1, y1), (x2, y2) = one, middle, other
     return abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)) / 2
 
@@ -218,7 +219,7 @@ def _node(tree, kind, x):
 
 
 def _math(tree, operation, x, *values):
-    """Add a node that calculates; its values are numbers or other nodes' outputs."""
+    """Add a Math node and return its output; `values` are numbers or other nodes' outputs."""
     node = _node(tree, "ShaderNodeMath", x)
     node.operation = operation
     for socket, value in zip(node.inputs, values, strict=False):

@@ -1,9 +1,11 @@
-"""Label maps' objects in Blender: colour by a column, select by class, hide by value, rename.
+"""Colour, select, hide and rename the objects of label maps in Blender.
 
-Each object of a label map is some faces of its tile's mesh; a face's attributes are its object's
-columns. What is shown by these operators is Blender's alone (nodes, and a modifier that leaves
-faces out); what an artist means by them is kept on the root object, and overlay.py writes it: the
-column that colours first, objects' own colours, hidden objects, names of classes.
+An object of a label map is a set of faces of its tile's mesh. The columns of its table row are
+attributes of these faces.
+
+The operators change the display with Blender's own means: shader nodes, and a modifier that removes
+the faces of hidden objects. The edits themselves are kept on the root object, and overlay.py writes
+them: the default column for colours, colours of single objects, hidden objects, names of classes.
 """
 
 import json
@@ -13,23 +15,23 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
-KEPT = "stereocell_objects"  # on the root object: by channel, what was meant
-LABELS = "stereocell_labels"  # on a mesh's object: its objects' numbers, as texts
-CHANNEL = "stereocell_channel"  # there, too
+KEPT = "stereocell_objects"  # on the root object: the edits of each channel, as JSON
+LABELS = "stereocell_labels"  # on a mesh's object: the labels of its objects, as JSON
+CHANNEL = "stereocell_channel"  # on a mesh's object: its channel
 OBJECT_ID, COLOR, HIDDEN = "objectId", "displayColor", "stereocell_hidden"
 AS_STAGED = "AS_STAGED"
-_NODE = "StereoCell column"  # label of nodes that show a column
-_BEFORE = "stereocell_before"  # on a material: what fed its colour
-# viridis (Smith & van der Walt), linear RGB at even steps
+_NODE = "StereoCell column"  # label of the nodes that colour by a column
+_BEFORE = "stereocell_before"  # on a material: the node and socket that its colour was linked to
+# Linear RGB of the colour map viridis (Smith & van der Walt), at even steps
 _VIRIDIS = (
     (0.058, 0.0, 0.089), (0.045, 0.078, 0.256), (0.013, 0.275, 0.271), (0.119, 0.584, 0.129),
     (0.984, 0.799, 0.019),
 )  # fmt: skip
-_items = {}  # Blender keeps no reference to what an enumeration's callback returns
+_items = {}  # keeps the results of callbacks for enumerations alive; Blender does not
 
 
 def read_columns(prim):
-    """Return what a channel's prim says of its columns; None: it is no label map."""
+    """Return the columns and the default column of a channel; None if it is not a label map."""
     ids = prim.GetAttribute("stereocell:columns").Get()
     if ids is None:
         return None
@@ -43,7 +45,7 @@ def read_columns(prim):
 
 
 def keep_labels(stage, channels, objects):
-    """Note on each mesh of objects whose they are."""
+    """Store the labels of its objects, and its channel, on each mesh of a label map."""
     for path, block in objects.items():
         labels = stage.GetPrimAtPath(path).GetAttribute("stereocell:objectLabels").Get()
         channel = stage.GetPrimAtPath(path).GetParent().GetName()
@@ -53,7 +55,11 @@ def keep_labels(stage, channels, objects):
 
 
 def kept(root):
-    """Return what was meant: by channel `default`, `colors` and `hidden` by label, `classes`."""
+    """Return the edits of each channel's objects.
+
+    The keys are `default` (a column), `colors` by label, `hidden` (labels), and `classes` (names by
+    column).
+    """
     return json.loads(root.get(KEPT, "{}"))
 
 
@@ -73,7 +79,7 @@ def _root(context):
 
 
 def _described(root):
-    """Return the first label map of a specimen and its columns; of several the others are alike."""
+    """Return the first label map of a specimen and its columns; others are not offered."""
     state = json.loads(root["stereocell"]) if root is not None else {}
     found = [(name, look["objects"]) for name, look in state.get("channels", {}).items()
              if look.get("objects")]  # fmt: skip
@@ -85,7 +91,7 @@ def _meshes(context, channel):
 
 
 def _values(block, name, kind=np.float32):
-    """Return an attribute of a mesh's faces; None: it has none."""
+    """Return an attribute of a mesh's faces (n,); None if the faces do not have it."""
     attribute = block.data.attributes.get(name)
     if attribute is None or attribute.domain != "FACE":
         return None
@@ -246,7 +252,7 @@ class RenameClass(_OfObjects):
 
 
 class ObjectsPanel(bpy.types.Panel):
-    """Beside the 3D view: what can be done with the objects of a label map"""
+    """The panel beside the 3D view that edits the objects of a label map."""
 
     bl_idname = "VIEW3D_PT_stereocell_objects"
     bl_label = "Objects"
@@ -293,7 +299,7 @@ def _select(context, channel, which):
 
 
 def _paint(block, faces, color):
-    """Write a colour of faces where Blender has those of the stage: at their corners."""
+    """Set the colour of some faces; Blender's importer stores colours at the faces' corners."""
     attribute = block.data.attributes.get(COLOR)
     if attribute is None:
         attribute = block.data.attributes.new(COLOR, "FLOAT_COLOR", "CORNER")
@@ -334,7 +340,7 @@ def _draw_hidden(context, channel, hidden):
 
 
 def _left_out():
-    """Return the geometry nodes that leave out the faces of hidden objects."""
+    """Return the geometry nodes that delete the faces of hidden objects; make them if needed."""
     tree = bpy.data.node_groups.get(HIDDEN)
     if tree is not None:
         return tree
@@ -360,7 +366,10 @@ def _materials(context, channel):
 
 
 def _show(context, channel, described, column):
-    """Feed a column, or the objects' own colours, to the colour of all of their materials."""
+    """Colour a channel's materials by a column, by the objects' own colours, or as in the stage.
+
+    The colour map of a numeric column spans the 0.1th to the 99.9th percentile of its values.
+    """
     for material in _materials(context, channel):
         _undress(material)
     if column == AS_STAGED:
@@ -426,7 +435,10 @@ def _undress(material):
 
 @contextmanager
 def as_staged(context, root):
-    """Let the materials be without columns inside the block: what was done else is compared."""
+    """Remove the nodes that colour by a column while the block runs, and add them again.
+
+    The export then compares the materials without these nodes.
+    """
     channel, described = _described(root)
     for material in _materials(context, channel):
         _undress(material)

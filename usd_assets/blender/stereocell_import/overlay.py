@@ -1,10 +1,16 @@
-"""Write what an artist changed as a layer over the stage: `stereocell bundle OUT --stage LAYER`.
+"""Write an artist's edits as a layer over the stage, for `stereocell bundle OUT --stage LAYER`.
 
-Colours (in a channel's colour group), opacities (in a volume material's ramp), objects hidden or
-deleted, tiles, meshes and volumes moved, points of meshes moved, lights, variants chosen at the
-import, what objects.py keeps of label maps, and what was added (additions.py).
-Whatever else was done to the specimen is lost, and named. Where the whole of it stands in the scene
-is the scene's own affair.
+The layer carries these edits:
+
+- colours in a channel's colour group, and opacities in a volume material's ramp
+- objects that were hidden or deleted
+- tiles, meshes and volumes that were moved, and moved points of meshes
+- lights, and the variants that were chosen at the import
+- edits of the objects of label maps (objects.py)
+- objects that were added to the scene (additions.py)
+
+Other edits of the specimen are lost, and the export lists them. The position of the whole specimen
+in the scene is not an edit.
 """
 
 import json
@@ -29,12 +35,12 @@ from .snapshot import digest_nodes, find_losses, points_of_mesh, take_snapshot
 
 BUILT_CAMERAS = ("mono", "left", "right")
 _IN_GROUP = "a channel's colour and opacity are values of its node group"
-_MOVED = 1e-4  # of the longest translation and of 1: floats of 32 bits, through a scale of 1e-6
+_MOVED = 1e-4  # relative tolerance; true-size matrices are 32-bit floats with a scale of 1e-6
 
 
 @dataclass(frozen=True)
 class Edits:
-    """A line for each edit that the layer carries, and for each that it does not."""
+    """One line for each edit that the layer carries, and one for each that it does not carry."""
 
     carried: list[str]
     lost: list[str]
@@ -45,7 +51,7 @@ class Edits:
 
 
 def export_edits(context, path):
-    """Write the layer; return its Edits. Raises StageProblem."""
+    """Write the edits since the import as a layer; return a list of them. Raises StageProblem."""
     root = _find_root(context)
     state = json.loads(root[STATE])
     stage_path, path = Path(state["stage"]), Path(bpy.path.abspath(str(path)))
@@ -59,7 +65,7 @@ def export_edits(context, path):
     layer.pseudoRoot.SetInfo("metersPerUnit", METERS_PER_UNIT)
     layer.pseudoRoot.SetInfo("upAxis", "Y")
     layer.subLayerPaths = [_name_of(stage_path, path)]
-    Sdf.CreatePrimInLayer(layer, ROOT)  # the default prim, also where nothing was edited
+    Sdf.CreatePrimInLayer(layer, ROOT)  # the default prim must exist even if nothing was edited
     objects, strangers = _find_objects(context, root, state)
     lost = []
     edits = [
@@ -89,7 +95,10 @@ def export_edits(context, path):
 
 
 def _find_root(context):
-    """Return the specimen above the active object, or the only one."""
+    """Return the root of the specimen that has the active object, or of the only specimen.
+
+    Raises StageProblem if there is no specimen, or if none of several is active.
+    """
     block = context.view_layer.objects.active
     while block is not None and STATE not in block:
         block = block.parent
@@ -102,7 +111,7 @@ def _find_root(context):
 
 
 def _find_objects(context, root, state):
-    """Return the specimen's objects by the paths of their prims, and those that it did not have."""
+    """Return the specimen's objects by the paths of their prims, and the objects added since."""
     objects, strangers = {}, []
     known = {one["name"] for one in state["snapshots"].values()} | set(state["others"])
     for block in sorted(context.scene.objects, key=lambda block: block.name not in known):
@@ -118,7 +127,7 @@ def _find_objects(context, root, state):
 
 
 def _find_losses(context, state, objects):
-    """Return what was done to the specimen that the layer does not carry."""
+    """Return one line for each edit of the specimen that the layer does not carry."""
     lost = []
     for path, before in state["snapshots"].items():
         block = objects.get(path)
@@ -156,7 +165,7 @@ def _is_below(root, block):
 
 
 def _name_of(stage, layer):
-    """Return how a layer names its stage: relative, so that both can be moved together."""
+    """Return the path from a layer to its stage, relative so that both can be moved together."""
     try:
         relative = os.path.relpath(stage.resolve(), layer.resolve().parent)
     except ValueError:  # on another drive
@@ -188,7 +197,7 @@ def _write_looks(layer, stage, root, state):
         if _differ(points, look["points"]):
             pairs = Vt.Vec2fArray([Gf.Vec2f(*pair) for pair in points])
             place = path
-            if look["function"]:  # in its variant: the other functions stay as they are
+            if look["function"]:  # written into its variant; other functions keep their points
                 variant = Sdf.CreateVariantInLayer(
                     layer, path, "transferFunction", look["function"]
                 )
@@ -220,7 +229,7 @@ def _write_hidden(layer, state, objects):
                 _hide(layer, leaf)
                 yield f"{leaf.rsplit('/', 1)[1]}: hidden"
     for leaf in hidden:
-        if not leaf.startswith(f"{TILES}/"):  # an addition of an earlier export
+        if not leaf.startswith(f"{TILES}/"):  # a mesh that an earlier export added
             _hide(layer, leaf)
             yield f"{leaf.rsplit('/', 1)[1]}: hidden"
 
@@ -234,14 +243,17 @@ def _hide(layer, path):
 
 
 def _write_moved(layer, state, root, objects, lost):
-    """Yield what is moved of the tiles and what they hold; of the rest, `lost` gets the names."""
+    """Write the new positions of moved objects, and yield one line for each.
+
+    A move that a bundle does not take over is appended to `lost`.
+    """
     for path, before in state["matrices"].items():
         block = objects.get(path)
         matrix = before if block is None else matrix_of(path, {ROOT: root, **objects})
         if not _differ(matrix, before, _MOVED):
             continue
         name = path.rpartition("/")[2]
-        is_field = path.rpartition("/")[0] in state["leaves"]  # of a volume: drawn as that is
+        is_field = path.rpartition("/")[0] in state["leaves"]  # a field of a volume
         if is_field or not _is_placed(path, state):
             lost.append(f"the place of {name} is not taken over: {_why_it_stays(path, is_field)}")
             continue
@@ -254,7 +266,7 @@ def _write_moved(layer, state, root, objects, lost):
 
 
 def _is_placed(path, state):
-    """Return whether a bundle takes over where a prim stands, or what it holds."""
+    """Return whether a bundle takes over the position of a prim."""
     if f"{path}/".startswith((f"{TILES}/", f"{LIGHTS}/")):
         return True
     above, _, name = path.rpartition("/")
@@ -272,7 +284,7 @@ def _why_it_stays(path, is_field):
 
 
 def _write_lights(layer, stage, state, objects):
-    """Yield what was done to the strengths and colours of the stage's lights."""
+    """Write the edits of the stage's lights, and yield one line for each."""
     for path, before in state["lights"].items():
         block = objects.get(path)
         name = path.rpartition("/")[2]
@@ -292,14 +304,17 @@ def _write_lights(layer, stage, state, objects):
 
 
 def _write_points(layer, stage, state, objects, lost):
-    """Yield which meshes have moved points: in the level of detail that was imported."""
+    """Write the meshes whose points moved, and yield one line for each.
+
+    The points are those of the level of detail that was imported.
+    """
     for path in state["leaves"]:
         block, before = objects.get(path), state["snapshots"][path]
         if block is None or block.type != "MESH":
             continue
         now = take_snapshot(block)
         if now["points"] == before["points"] or now["faces"] != before["faces"]:
-            continue  # other faces are told as a loss
+            continue  # find_losses reports changed faces
         if not path.startswith(f"{TILES}/"):
             lost.append(
                 f"the shape of {before['name']} is not taken over: an earlier layer added it: hide "
@@ -324,7 +339,7 @@ def _write_points(layer, stage, state, objects, lost):
 
 
 def _write_objects(layer, stage, root, objects):
-    """Yield what was done to the objects of label maps."""
+    """Write the edits of the objects of label maps, and yield one line for each."""
     kind = Sdf.ValueTypeNames
     for channel, meant in kept(root).items():
         path = f"{CHANNELS}/{channel}"
@@ -347,7 +362,10 @@ def _write_objects(layer, stage, root, objects):
 
 
 def _write_colors(layer, stage, channel, colors, objects):
-    """Yield the meshes whose objects have colours of their own: of all levels of detail."""
+    """Write the colours of single objects into each mesh, and yield one line for each mesh.
+
+    The colours hold at all levels of detail.
+    """
     for path, block in objects.items():
         if block.get(CHANNEL) != channel:
             continue
@@ -360,7 +378,7 @@ def _write_colors(layer, stage, channel, colors, objects):
         name = "primvars:displayColor"
         values = np.array(stage.GetPrimAtPath(path).GetAttribute(name).Get(), np.float32)
         if len(values) != len(labels):
-            continue  # others than the objects' by now
+            continue  # the stage's mesh has other objects now than at the import
         for place, color in own.items():
             values[place] = color
         array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values))
@@ -369,7 +387,7 @@ def _write_colors(layer, stage, channel, colors, objects):
 
 
 def _write_hints(layer, stage, state, root, objects):
-    """Let the box that an unloaded tile is known by hold what was moved inside it."""
+    """Widen each tile's extents hint, its box while unloaded, to hold moved meshes and volumes."""
     for tile, lod in state["lods"].items():
         path = f"{TILES}/{tile}"
         hint = UsdGeom.ModelAPI(stage.GetPrimAtPath(path)).GetExtentsHintAttr().Get()
@@ -402,7 +420,7 @@ def _write_hints(layer, stage, state, root, objects):
 
 
 def _widen_root(layer, stage):
-    """Let the specimen's box hold what was moved or added."""
+    """Widen the specimen's extents hint to hold moved tiles and added objects."""
     root = stage.GetPrimAtPath(ROOT)
     hint = UsdGeom.ModelAPI(root).GetExtentsHint()
     if not hint:
@@ -450,15 +468,16 @@ def _as_staged(stage, tile, lod, path):
 
 
 def _place_of(tile, lod, path):
-    """Return where opinions on a mesh belong: the other levels of detail have other points.
+    """Return the path in a layer for edits of a mesh in one level of detail.
 
-    A flattened stage has one level, and no variants.
+    The path lies in the level's variant, since other levels have other points. A flattened stage
+    has one level and no variants; its `lod` is empty.
     """
     return f"{tile}{{lod={lod}}}{path.removeprefix(f'{tile}/')}" if lod else path
 
 
 def _write_shape(layer, place, mesh, points):
-    """Write points and what follows from them: extent, normals, tangents."""
+    """Write a mesh's points, and the extent, normals and tangents that follow from them."""
     kind = Sdf.ValueTypeNames
     before = np.array(mesh.GetPointsAttr().Get(), np.float32)
     array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points))
@@ -474,7 +493,7 @@ def _write_shape(layer, place, mesh, points):
     primvar = prim.GetAttribute("primvars:normals").Get()
     normals = mesh.GetNormalsAttr().Get() if primvar is None else primvar
     normals = np.array([] if normals is None else normals, np.float32)
-    is_known = normals.shape == points.shape  # at vertices, as the pipeline has them
+    is_known = normals.shape == points.shape  # the pipeline writes one normal for each vertex
     groups = group_seams(before, points, normals if is_known else points)
     if is_known:
         turned = turn_with(normals, before, points, triangles, groups)
@@ -499,7 +518,10 @@ def _write_shape(layer, place, mesh, points):
 
 
 def _differ(rows, others, tolerance=1e-5):
-    """Tell whether two tables of numbers differ by more than a share of their largest, or of 1."""
+    """Return whether two tables differ by more than `tolerance`, relative to the largest number.
+
+    The largest number of `others` counts, or 1 if that is larger.
+    """
     if len(rows) != len(others):
         return True
     pairs = [

@@ -1,5 +1,5 @@
-"""What the user is told when a stage can't be imported or exported."""
+"""The error that users see when a stage can't be imported or exported."""
 
 
 class StageProblem(Exception):
-    """One line for the status bar."""
+    """A stage can't be imported or exported; the message is one line for Blender's status bar."""

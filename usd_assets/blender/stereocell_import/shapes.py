@@ -1,15 +1,17 @@
-"""Turn a surface's normals and tangents with it when its points are moved."""
+"""Turn the normals and tangents of a surface with it when its points are moved."""
 
 import numpy as np
 
 
 def turn_with(vectors, before, after, triangles, groups):
-    """Return vectors (n, 3) at the vertices of a mesh turned as the surface round them turned.
+    """Return the vectors (n, 3) at a mesh's vertices, turned as the surface around them turned.
 
-    before, after  places (n, 3); triangles: (m, 3)
-    groups         a number for each vertex (n,): vertices along a seam of UVs share theirs
+    Vectors of vertices whose triangles did not change are returned bit for bit.
 
-    Vertices none of whose triangles changed keep theirs, bit by bit.
+    before     positions of the vertices before the edit (n, 3)
+    after      positions of the vertices after the edit (n, 3)
+    triangles  vertices of the triangles (m, 3)
+    groups     group of each vertex (n,); the copies of a vertex along a UV seam share a group
     """
     moved = (before != after).any(axis=1)
     touched = np.zeros(len(before), bool)
@@ -17,7 +19,7 @@ def turn_with(vectors, before, after, triangles, groups):
     touched = np.isin(groups, groups[touched])
     old, new = (_facing(points, triangles, groups)[touched] for points in (before, after))
     given = vectors[touched].astype(np.float64)
-    # the shortest turn from old to new (Rodrigues)
+    # Rodrigues' formula for the shortest rotation from old to new
     axis, cosine = np.cross(old, new), (old * new).sum(axis=1, keepdims=True)
     along = (axis * given).sum(axis=1, keepdims=True)
     turned = cosine * given + np.cross(axis, given) + axis * along / np.maximum(1 + cosine, 1e-6)
@@ -29,13 +31,17 @@ def turn_with(vectors, before, after, triangles, groups):
 
 
 def group_seams(before, after, normals):
-    """Return a number for each vertex: those at one place with one normal share theirs."""
+    """Return a group for each vertex (n,): vertices with equal positions and normals share one."""
     rows = np.concatenate([before, after, normals], axis=1)
     return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def cut_fans(counts, indices):
-    """Return the triangles (m, 3) of faces with any number of corners."""
+    """Return the triangles (m, 3) of polygons, each cut into a fan from its first corner.
+
+    counts   number of corners of each polygon
+    indices  vertices of all corners, polygon after polygon
+    """
     starts = np.cumsum(counts) - counts
     fans = np.maximum(counts - 2, 0)
     first = np.repeat(starts, fans)
@@ -44,7 +50,10 @@ def cut_fans(counts, indices):
 
 
 def _facing(points, triangles, groups):
-    """Return unit normals (n, 3) of the triangles round each group, by area; 0 where none are."""
+    """Return each vertex's unit normal (n, 3): the area-weighted mean over its group's triangles.
+
+    The normal is 0 if the group has no triangles with an area.
+    """
     a, b, c = points.astype(np.float64)[triangles].transpose(1, 0, 2)
     total = np.zeros((int(groups.max(initial=0)) + 1, 3))
     for corner in triangles.T:

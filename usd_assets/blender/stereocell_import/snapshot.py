@@ -1,6 +1,6 @@
-"""What an imported object was like, so that the export knows what was done to it since.
+"""Record the state of an imported object, so that the export can find the edits made since.
 
-A layer carries some of that (overlay.py). `find_losses` names the rest.
+overlay.py writes the edits that a layer can carry. `find_losses` names the others.
 """
 
 import hashlib
@@ -19,7 +19,7 @@ _LAYOUT = {
 
 
 def take_snapshot(block):
-    """Return what is to be compared of an object: JSON."""
+    """Return the state of an object that an export compares, as values that JSON can store."""
     found = {"name": block.name, "modifiers": _modifiers(block)}
     if block.type == "MESH":
         mesh = block.data
@@ -38,7 +38,7 @@ def take_snapshot(block):
 
 
 def _modifiers(block):
-    return [one.name for one in block.modifiers if one.name != HIDDEN]  # which a layer carries
+    return [one.name for one in block.modifiers if one.name != HIDDEN]  # a layer carries it
 
 
 def take_materials(blocks):
@@ -48,14 +48,14 @@ def take_materials(blocks):
 
 
 def points_of_mesh(mesh):
-    """Return the places of a mesh's vertices in its own space, float32 (n, 3)."""
+    """Return the positions of a mesh's vertices in its own space, float32 (n, 3)."""
     return _read(mesh.vertices, "co", np.float32, 3)
 
 
 def find_losses(block, before):
-    """Yield what was done to an object that no layer carries; `before`: its snapshot.
+    """Yield one line for each edit of an object that a layer cannot carry.
 
-    The words are those of `stereocell bundle`.
+    `before` is the object's snapshot. The lines are worded like those of `stereocell bundle`.
     """
     now, name = take_snapshot(block), before["name"]
     if now["name"] != name:
@@ -78,8 +78,10 @@ def find_losses(block, before):
 
 
 def digest_nodes(tree):
-    """Return a digest of a shader's nodes but for what a layer carries: a channel's colour and
-    opacity, and the positions and opacities of its ramp."""
+    """Return a digest of a shader's nodes, without the values that a layer carries.
+
+    These are a channel's colour and opacity, and the positions and opacities of its ramp.
+    """
     return _hash(_describe_nodes(tree))
 
 
@@ -121,7 +123,7 @@ def _describe_ramp(ramp):
 
 
 def _properties(node):
-    """Return the names of a node's settings: how it calculates, not where it is drawn."""
+    """Return the names of the settings that affect a node's result, not its place in the editor."""
     kinds = ("BOOLEAN", "INT", "FLOAT", "STRING", "ENUM")
     return sorted(
         one.identifier

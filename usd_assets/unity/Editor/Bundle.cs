@@ -24,7 +24,8 @@ namespace StereoCell.Editor
         public Box Bounds;
     }
 
-    /// <summary>A surface of one tile: its file, and how far it may be from the finest one.</summary>
+    /// <summary>One level of detail of a tile's surface: its file, and its largest distance from the finest
+    /// level.</summary>
     public struct Level
     {
         public string Path;
@@ -39,7 +40,7 @@ namespace StereoCell.Editor
         public int Apron;
         public Box Bounds;
 
-        /// <summary>4 x 4, column by column: from <see cref="Bounds"/> to the world, um.</summary>
+        /// <summary>4 x 4 matrix, column by column, from the space of <see cref="Bounds"/> to the world, um.</summary>
         public double[] Matrix;
 
         public int[][] Levels;
@@ -54,10 +55,10 @@ namespace StereoCell.Editor
         public string[] Functions;
         public string Table;
 
-        /// <summary>Whether it shows when the bundle is opened.</summary>
+        /// <summary>Whether the channel is visible when the bundle is opened.</summary>
         public bool Opens;
 
-        /// <summary>By tile, finest first.</summary>
+        /// <summary>Levels of each tile, finest first.</summary>
         public Dictionary<string, List<Level>> Surfaces = new Dictionary<string, List<Level>>();
 
         public Dictionary<string, VolumeEntry> Volumes = new Dictionary<string, VolumeEntry>();
@@ -113,7 +114,7 @@ namespace StereoCell.Editor
             return Checked(path, entry);
         }
 
-        /// <summary>The SHA-256 of a file, in hexadecimal digits, as files.json has it.</summary>
+        /// <summary>The SHA-256 that files.json states for a file, in hexadecimal digits.</summary>
         public string HashOf(string path)
         {
             var entry = files[path] as JObject;
@@ -152,7 +153,8 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>A member that each bundle has.</summary>
+        /// <summary>A member that every bundle must have.</summary>
+        /// <exception cref="BundleException">The member is missing.</exception>
         static JToken Member(JToken from, string name)
         {
             var found = from is JObject ? from[name] : null;
@@ -160,7 +162,7 @@ namespace StereoCell.Editor
             return found;
         }
 
-        /// <summary>What becomes part of a file's name here, as the bundle's schema has it.</summary>
+        /// <summary>Check an identifier by the pattern of the bundle's schema: it becomes part of file names.</summary>
         static string Identifier(string id)
         {
             if (!Regex.IsMatch(id, "^[A-Za-z_][A-Za-z0-9_]*$")) throw new BundleException(id + " is no identifier of a tile or channel");
@@ -198,7 +200,8 @@ namespace StereoCell.Editor
             return entry;
         }
 
-        /// <summary>The levels of each tile: in the tileset's tree a coarser one holds the finer one.</summary>
+        /// <summary>Collect the levels of each tile. In the tileset's tree a coarse level is the parent of the
+        /// next finer one.</summary>
         void AddSurfaces(ChannelEntry entry, string path)
         {
             var left = new Stack<KeyValuePair<JToken, string>>();
@@ -226,7 +229,7 @@ namespace StereoCell.Editor
             foreach (var levels in entry.Surfaces.Values) levels.Sort(FinerFirst);
         }
 
-        /// <summary>Two levels may be off by the same: then by their names, lod1 before lod2.</summary>
+        /// <summary>Order levels by their errors; equal errors by their names, so lod1 comes before lod2.</summary>
         static int FinerFirst(Level a, Level b)
         {
             var byError = a.ErrorMetres.CompareTo(b.ErrorMetres);

@@ -9,15 +9,16 @@ using Newtonsoft.Json.Linq;
 
 namespace StereoCell.Editor
 {
-    /// <summary>What is wrong with a bundle, in a line, for people.</summary>
+    /// <summary>A bundle cannot be read; the message is one line for the user.</summary>
     public sealed class BundleException : IOException
     {
         public BundleException(string message) : base(message) { }
     }
 
     /// <summary>
-    /// The files behind a `.stereocell` asset. The asset is either a zip file of the bundle's folder, or a link: the JSON
-    /// object {"bundle": "folder"}, with a path that starts at the asset's own folder unless it is absolute.
+    /// The files of a bundle behind a `.stereocell` asset. The asset is a zip file of the bundle's folder, or a link to
+    /// this folder. A link is the JSON object {"bundle": "folder"}. Its path is absolute, or relative to the folder of
+    /// the asset.
     /// </summary>
     public sealed class BundleFiles : IDisposable
     {
@@ -85,7 +86,8 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>The link's text. A folder in the project is named from the asset's folder, as both move with it.</summary>
+        /// <summary>The text of a link. The path to a folder inside the project is relative, so that it stays right when
+        /// the project is moved.</summary>
         public static string LinkTo(string folder, string asset)
         {
             var whole = Path.GetFullPath(folder).Replace('\\', '/');
@@ -94,7 +96,7 @@ namespace StereoCell.Editor
             return new JObject(new JProperty("bundle", named)).ToString() + "\n";
         }
 
-        /// <summary>The path of a file or folder from the folder in which another file lies, with slashes.</summary>
+        /// <summary>The path to a file or folder, relative to the folder of another file, with slashes.</summary>
         public static string RelativePath(string file, string path)
         {
             var from = Path.GetFullPath(file).Replace('\\', '/').Split('/');

@@ -7,7 +7,7 @@ using UnityEngine;
 
 namespace StereoCell.Editor
 {
-    /// <summary>Brings a bundle into the project, as a link to its folder or as a copy in one file.</summary>
+    /// <summary>Adds a bundle to the project, as a link to its folder or as a copy in one file.</summary>
     public static class BundleMenu
     {
         [MenuItem("Assets/StereoCell/Link Bundle...", false, 30)]
@@ -38,29 +38,29 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>Import a bundle where it lies. When it is built anew, the specimen is imported again.</summary>
-        /// <param name="asset">The file to write, as "Assets/half.stereocell". A file that is there and differs stays,
-        /// and the new one gets a number.</param>
+        /// <summary>Import a bundle from its own folder. The specimen is imported again after each new build.</summary>
+        /// <param name="asset">The file to write, such as "Assets/half.stereocell". If another file has this name, it
+        /// stays, and the new file's name gets a number.</param>
         public static GameObject Link(string folder, string asset)
         {
             CheckBundle(folder);
             var text = BundleFiles.LinkTo(folder, asset);
             if (!File.Exists(asset) || File.ReadAllText(asset) != text)
             {
-                asset = FreePath(asset);  // in the same folder, so the text stays
+                asset = FreePath(asset);  // in the same folder, so a relative path in the text stays right
                 File.WriteAllText(asset, text);
             }
             BundleWatcher.Register(folder);
             return Imported(asset);
         }
 
-        /// <summary>Import a copy of a bundle, one zip file that goes with the project.</summary>
-        /// <param name="asset">As for a link.</param>
+        /// <summary>Import a copy of a bundle: one zip file that belongs to the project.</summary>
+        /// <param name="asset">The file to write. If the name is taken, the new file's name gets a number.</param>
         public static GameObject Copy(string folder, string asset)
         {
             CheckBundle(folder);
             asset = FreePath(asset);
-            // the files are packed already, each in its own way
+            // No compression: each file of a bundle is already compressed in its own format.
             ZipFile.CreateFromDirectory(folder, asset, CompressionLevel.NoCompression, false);
             return Imported(asset);
         }

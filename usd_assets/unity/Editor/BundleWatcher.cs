@@ -8,16 +8,17 @@ using UnityEngine.Rendering;
 namespace StereoCell.Editor
 {
     /// <summary>
-    /// Has specimens imported again whose bundle was built anew: a linked folder lies outside the project, so Unity does
-    /// not see its changes. manifest.json holds the hash of the list of all files, so a change of any file changes it.
-    /// Bundles are looked at when the editor starts, and whenever it comes to the front.
+    /// Imports specimens again after their bundle was rebuilt. A linked folder lies outside the project, so Unity does
+    /// not see its changes. The class therefore checks each linked manifest.json when the editor starts and whenever
+    /// the editor comes to the front. The manifest holds the hash of the list of all files, so a change of any file
+    /// changes it.
     /// </summary>
     [InitializeOnLoad]
     public static class BundleWatcher
     {
         public const string PipelineName = "StereoCell/pipeline";
 
-        /// <summary>What was registered since the scripts were loaded.</summary>
+        /// <summary>Hashes that were registered since the scripts were loaded, by the dependency's name.</summary>
         static readonly Dictionary<string, Hash128> registered = new Dictionary<string, Hash128>();
 
         static BundleWatcher()
@@ -29,13 +30,14 @@ namespace StereoCell.Editor
             };
         }
 
-        /// <summary>The dependency of a specimen on its linked folder.</summary>
+        /// <summary>The name of a specimen's dependency on its linked folder.</summary>
         public static string NameOf(string folder)
         {
             return "StereoCell/bundle/" + Path.GetFullPath(folder).Replace('\\', '/');
         }
 
-        /// <summary>Note what linked bundles hold now, and have Unity import the specimens for which that has changed.</summary>
+        /// <summary>Register the current content of all linked bundles. Unity then imports the specimens whose bundle has
+        /// changed.</summary>
         public static void Look()
         {
             var pipeline = GraphicsSettings.currentRenderPipeline;
@@ -49,13 +51,13 @@ namespace StereoCell.Editor
                 }
                 catch (IOException)
                 {
-                    // The import of this asset says what is wrong with it.
+                    // The import of this asset reports the error.
                 }
             }
             if (isNew) AssetDatabase.Refresh();
         }
 
-        /// <summary>Note what a linked folder holds. Returns whether it is something new.</summary>
+        /// <summary>Register the content of a linked folder. Returns whether it has changed.</summary>
         public static bool Register(string folder)
         {
             var manifest = Path.Combine(folder, "manifest.json");

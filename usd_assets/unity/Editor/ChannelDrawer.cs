@@ -4,7 +4,8 @@ using UnityEngine;
 
 namespace StereoCell.Editor
 {
-    /// <summary>A channel in a line of the Inspector: whether it shows, its colour, its transfer function by name.</summary>
+    /// <summary>Draws a channel as one line of the Inspector: visibility, colour, and name of the transfer
+    /// function.</summary>
     [CustomPropertyDrawer(typeof(Channel))]
     public sealed class ChannelDrawer : PropertyDrawer
     {

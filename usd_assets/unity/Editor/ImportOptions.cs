@@ -26,10 +26,10 @@ namespace StereoCell.Editor
         const int MostOfUnity = 2048;  // texels along an edge of a 3D texture
 
         /// <summary>
-        /// The finest level at which every box of a tile has few enough texels along its edges and all boxes together
-        /// fit into the budget; the coarsest one, if none does.
+        /// The finest level at which no box of a tile has too many texels along an edge, and all boxes together fit into
+        /// the budget. The coarsest level is returned if no level fits.
         /// </summary>
-        /// <param name="boxes">Levels of each box, finest first, and how many channels it has.</param>
+        /// <param name="boxes">Sizes of each box's levels, finest first, and its number of channels.</param>
         public int LevelFor(IList<KeyValuePair<int[][], int>> boxes)
         {
             var levels = int.MaxValue;

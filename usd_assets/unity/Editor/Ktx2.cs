@@ -4,8 +4,8 @@ using System.IO;
 
 namespace StereoCell.Editor
 {
-    /// <summary>One level of an 8-bit KTX 2.0 texture as a bundle has them: R8 or RGBA8, zstd. KTX for Unity
-    /// makes 2D textures alone.</summary>
+    /// <summary>Reads one level of a bundle's KTX 2.0 textures, which are R8 or RGBA8 and packed by zstd. The package
+    /// KTX for Unity cannot be used: it makes only 2D textures.</summary>
     public sealed class Ktx2
     {
         static readonly byte[] Identifier = { 0xAB, 0x4B, 0x54, 0x58, 0x20, 0x32, 0x30, 0xBB, 0x0D, 0x0A, 0x1A, 0x0A };
@@ -17,7 +17,7 @@ namespace StereoCell.Editor
         public readonly int Depth;
         public readonly int Components;
 
-        /// <summary>x fastest, then rows, then slices; components of a texel together.</summary>
+        /// <summary>Texels with x fastest, then rows, then slices; the components of a texel are adjacent.</summary>
         public readonly byte[] Texels;
 
         public Ktx2(byte[] data, int level)

@@ -6,22 +6,23 @@ using UnityEngine;
 namespace StereoCell.Editor
 {
     /// <summary>
-    /// Opacity by intensity, both 0 to 1, as pairs with straight lines between them: the form that the stage has. Unity's
-    /// curves and gradients are turned into it and back.
+    /// Converts between Unity's curves and gradients and the points of the stage. A point is a pair of intensity and
+    /// opacity, both 0 to 1. Straight lines connect the points.
     /// </summary>
     public static class OpacityPoints
     {
         public const int Samples = 256;
         const int MostOfGradient = 8;  // keys
 
-        /// <summary>Largest error of a function that is read from a table, in opacity: a line's ends and its samples are
-        /// each off by half a step of 8 bits.</summary>
+        /// <summary>Opacity. Largest error of a function that is read from a table. The ends of a line and the samples are
+        /// each rounded by up to half an 8-bit step.</summary>
         const float ToleranceOfTable = 1.01f / 255;
 
-        /// <summary>Largest error of a function that is drawn as a curve, in opacity.</summary>
+        /// <summary>Opacity. Largest error of a function that is drawn as a curve.</summary>
         const float ToleranceOfCurve = 0.1f / 255;
 
-        /// <summary>Few points with lines between them that lie this close to the samples, first and last included.</summary>
+        /// <summary>A small set of points whose lines lie within the tolerance of all samples. The first and the last sample
+        /// are always points.</summary>
         static List<Vector2> Of(IList<float> samples, float tolerance)
         {
             var points = new List<Vector2>();
@@ -30,7 +31,9 @@ namespace StereoCell.Editor
             return points;
         }
 
-        /// <summary>Of a row of the table: RGBA bytes.</summary>
+        /// <summary>The points of one row of the table.</summary>
+        /// <param name="rgba">Bytes of the table.</param>
+        /// <param name="first">Index of the row's first byte.</param>
         public static List<Vector2> OfRow(byte[] rgba, int first)
         {
             var samples = new float[Samples];
@@ -38,7 +41,8 @@ namespace StereoCell.Editor
             return Of(samples, ToleranceOfTable);
         }
 
-        /// <summary>Of a curve its keys, where lines lead from one to the next, and else points of its bends as well.</summary>
+        /// <summary>The points of a curve: its keys if straight lines connect them, otherwise points that follow its
+        /// bends.</summary>
         public static List<Vector2> OfCurve(AnimationCurve curve)
         {
             var keys = new List<Vector2>();
@@ -54,7 +58,7 @@ namespace StereoCell.Editor
             return areLines ? keys : Of(samples, ToleranceOfCurve);
         }
 
-        /// <summary>A gradient's opacity has lines between its keys.</summary>
+        /// <summary>The points of a gradient's opacity, which has straight lines between its keys.</summary>
         public static List<Vector2> OfGradient(Gradient gradient)
         {
             var points = new List<Vector2>();
@@ -75,7 +79,7 @@ namespace StereoCell.Editor
             return points[points.Count - 1].y;
         }
 
-        /// <summary>The alpha bytes of the table's row, as the bundle's own table has them.</summary>
+        /// <summary>The alpha bytes of a row of the table, rounded as in the bundle's own table.</summary>
         public static byte[] Row(IList<Vector2> points)
         {
             var row = new byte[Samples];
@@ -93,7 +97,8 @@ namespace StereoCell.Editor
             return new AnimationCurve(keys);
         }
 
-        /// <summary>A gradient has eight keys at most: of more points, those whose loss would be seen most.</summary>
+        /// <summary>A gradient with these points. Unity allows eight keys; the points whose removal changes the function
+        /// least are dropped.</summary>
         public static Gradient ToGradient(List<Vector2> points, Color color)
         {
             var kept = new List<Vector2>(points);
@@ -105,8 +110,8 @@ namespace StereoCell.Editor
             return gradient;
         }
 
-        /// <summary>A channel has one colour in the stage.</summary>
-        /// <exception cref="ArgumentException">The gradient has several colours.</exception>
+        /// <summary>The one colour of a gradient.</summary>
+        /// <exception cref="ArgumentException">The gradient has several colours; a channel of the stage has one.</exception>
         public static Color ColorOf(Gradient gradient)
         {
             var keys = gradient.colorKeys;
@@ -144,7 +149,8 @@ namespace StereoCell.Editor
             return new Vector2(i / (samples.Count - 1f), samples[i]);
         }
 
-        /// <summary>Douglas and Peucker's simplification (1973), by the error of opacity. The last sample is the caller's.</summary>
+        /// <summary>Douglas and Peucker's simplification (1973) by the error of opacity. The caller adds the last
+        /// sample.</summary>
         static void Keep(IList<float> samples, int first, int last, float tolerance, List<Vector2> points)
         {
             var worst = first;

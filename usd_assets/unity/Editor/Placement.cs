@@ -6,8 +6,9 @@ using UnityEngine;
 namespace StereoCell.Editor
 {
     /// <summary>
-    /// Where things of a bundle lie in Unity. The specimen's world is right-handed, Unity's left-handed: x is
-    /// mirrored, as glTFast mirrors what it imports. Lengths: metres for objects, um within a volume's box.
+    /// Positions and sizes of a bundle's tiles and volumes in Unity. The specimen's world is right-handed and Unity's is
+    /// left-handed, so x is mirrored, as glTFast does on import. Objects are measured in metres, places inside a volume's
+    /// box in um.
     /// </summary>
     public sealed class Placement
     {
@@ -16,10 +17,10 @@ namespace StereoCell.Editor
         /// <summary>The box's centre, metres.</summary>
         public Vector3 Centre;
 
-        /// <summary>The box's corners around it, metres: bit 0 of the index is x, bit 1 y, bit 2 z.</summary>
+        /// <summary>Metres. The box's corners relative to its centre. Bit 0 of the index is x, bit 1 y, bit 2 z.</summary>
         public Vector3[] Corners;
 
-        /// <summary>From there to the box's own space, um from its low corner: three rows.</summary>
+        /// <summary>Three rows of the matrix from metres around the centre to um from the box's low corner.</summary>
         public Vector4[] ToBox;
 
         public Vector4 Size;
@@ -27,13 +28,13 @@ namespace StereoCell.Editor
         public Vector4 TexHigh;
         public float Voxel;
 
-        readonly double[] toBox;  // from Unity's world, um: 3 rows of 4
-        readonly double[][] worldCorners;  // um
+        readonly double[] toBox;  // 3 rows of 4: from um in the mirrored world to the box
+        readonly double[][] worldCorners;  // um, in the mirrored world
 
         public Placement(VolumeEntry volume)
         {
             double[] min = volume.Bounds.Min, max = volume.Bounds.Max, m = volume.Matrix;
-            var low = new[] { -max[0], min[1], min[2] };  // of the mirrored box
+            var low = new[] { -max[0], min[1], min[2] };  // low corner of the mirrored box
             var size = new double[3];
             var voxel = double.MaxValue;
             float[] first = new float[3], last = new float[3];
@@ -47,11 +48,12 @@ namespace StereoCell.Editor
             }
             Size = new Vector4((float)size[0], (float)size[1], (float)size[2], 0);
             Voxel = (float)voxel;
-            // mirrored, x runs against the texture's; the image's rows run against y in both worlds
+            // In Unity's world both x and y run against the texture's axes: x because it is mirrored, and y because
+            // the image's rows run downwards.
             TexLow = new Vector4(last[0], last[1], first[2], 0);
             TexHigh = new Vector4(first[0], first[1], last[2], 0);
 
-            // the matrix between mirrored worlds, row by row: x is mirrored before and after it
+            // The matrix for mirrored spaces, row by row: x is mirrored before and after the original matrix.
             var fromBox = new double[12];
             for (var row = 0; row < 3; row++)
             {
@@ -84,7 +86,7 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>The box around all these volumes, in the space of this one's box.</summary>
+        /// <summary>The box around all volumes, um, in the space of this volume's box.</summary>
         public void Around(IEnumerable<Placement> all, out Vector4 low, out Vector4 high)
         {
             double[] min = { double.MaxValue, double.MaxValue, double.MaxValue };
@@ -105,7 +107,7 @@ namespace StereoCell.Editor
             high = new Vector4((float)max[0], (float)max[1], (float)max[2], 0);
         }
 
-        /// <summary>The centre of a box of the specimen, in Unity, metres.</summary>
+        /// <summary>Metres. The centre of one of the specimen's boxes in Unity's space.</summary>
         public static Vector3 CentreOf(Box bounds)
         {
             double[] a = bounds.Min, b = bounds.Max;
@@ -113,7 +115,7 @@ namespace StereoCell.Editor
                 -(a[0] + b[0]) / 2 * MetresPerUm, (a[1] + b[1]) / 2 * MetresPerUm, (a[2] + b[2]) / 2 * MetresPerUm);
         }
 
-        /// <summary>The edges of a box, metres.</summary>
+        /// <summary>Metres. The lengths of a box's edges.</summary>
         public static Vector3 SizeOf(Box bounds)
         {
             double[] a = bounds.Min, b = bounds.Max;
@@ -121,11 +123,12 @@ namespace StereoCell.Editor
         }
 
         /// <summary>
-        /// The share of the screen's height, for each level of detail, below which the next one is drawn: where
-        /// that one's error, as large as it may be, spans <paramref name="errorPixels"/>. The last level stays.
+        /// For each level of detail, the share of the screen's height below which the next level is drawn. At this share
+        /// the largest error of the next level spans <paramref name="errorPixels"/>. The last level has no limit: 0.
         /// </summary>
-        /// <param name="levels">Finest first.</param>
-        /// <param name="sizeMetres">The LODGroup's size: an object as high as the screen has share 1.</param>
+        /// <param name="levels">Levels of detail, finest first.</param>
+        /// <param name="sizeMetres">The LODGroup's size. An object of this size that is as high as the screen has the
+        /// share 1.</param>
         public static float[] LodHeights(IList<Level> levels, double sizeMetres, double errorPixels, double screenPixels)
         {
             var heights = new float[levels.Count];
@@ -133,7 +136,7 @@ namespace StereoCell.Editor
             {
                 var error = levels[i + 1].ErrorMetres;
                 var height = error > 0 ? errorPixels * sizeMetres / (error * screenPixels) : 1;
-                var most = i == 0 ? 1 : 0.99f * heights[i - 1];  // Unity wants them to fall
+                var most = i == 0 ? 1 : 0.99f * heights[i - 1];  // Unity needs falling shares
                 heights[i] = Math.Min((float)height, most);
             }
             return heights;

@@ -7,7 +7,8 @@ using System.Threading.Tasks;
 
 namespace StereoCell.Editor
 {
-    /// <summary>Runs an asynchronous method to its end on this thread: an importer has to return with its result.</summary>
+    /// <summary>Runs an asynchronous method to its end on this thread, because an importer must return the finished
+    /// result.</summary>
     static class RunHere
     {
         public static T ToEnd<T>(Func<Task<T>> method)

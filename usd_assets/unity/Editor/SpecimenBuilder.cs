@@ -8,7 +8,7 @@ using Object = UnityEngine.Object;
 namespace StereoCell.Editor
 {
     /// <summary>
-    /// Makes the objects of a bundle:
+    /// Makes the scene objects of a bundle:
     /// <code>
     /// specimen (Specimen, GazeSwitch; scaled)
     ///   r0_c0 (Tile, BoxCollider)
@@ -16,15 +16,15 @@ namespace StereoCell.Editor
     ///       CD31 (LODGroup): lod0, lod1, ...
     ///     volume: CD31 + Hoechst + MART1 (VolumeBox), four channels each
     /// </code>
-    /// Names of objects and identifiers of sub-assets follow the bundle's identifiers, so that they stay the same when
-    /// it is imported again: overrides in scenes and prefab variants refer to them.
+    /// Names of objects and identifiers of sub-assets derive from the bundle's identifiers. They stay the same when the
+    /// bundle is imported again, because overrides in scenes and prefab variants refer to them.
     /// </summary>
     sealed class SpecimenBuilder
     {
         public const string ShaderPath = "Packages/org.stereocell.bundle/Runtime/Shaders/StereoCellVolume.shader";
         const string ShaderName = "StereoCell/Volume";
-        const int Entries = 256;  // of a transfer function
-        const int MostShown = 4;  // channels, at first
+        const int Entries = 256;  // texels of a transfer function
+        const int MostShown = 4;  // channels that are visible after the import
 
         readonly Bundle bundle;
         readonly ImportOptions options;
@@ -32,9 +32,10 @@ namespace StereoCell.Editor
         readonly VolumeBuilder volumes;
         readonly Texture2D table;
 
-        /// <param name="guid">Of the asset that is imported.</param>
-        /// <param name="ownMaterial">The project's material for a channel's surfaces; null for those of the bundle.</param>
-        /// <param name="addAsset">Takes each mesh, material and texture with its identifier in the asset.</param>
+        /// <param name="guid">GUID of the imported asset.</param>
+        /// <param name="ownMaterial">Returns the project's material for a channel's surfaces; null keeps the bundle's
+        /// materials.</param>
+        /// <param name="addAsset">Adds a mesh, material or texture to the asset under an identifier.</param>
         public SpecimenBuilder(Bundle bundle, ImportOptions options, string guid, Func<string, Material> ownMaterial, Action<string, Object> addAsset)
         {
             this.bundle = bundle;
@@ -64,7 +65,7 @@ namespace StereoCell.Editor
         void AddChannels(Specimen specimen)
         {
             var row = 0;
-            // as the viewer opens: the channels that the bundle opens with, no more than four
+            // The same channels as in the viewer are visible at first: those that the bundle opens with, at most four.
             var shown = bundle.Channels.Where(channel => channel.Opens).Take(MostShown).ToList();
             foreach (var entry in bundle.Channels)
             {
@@ -95,7 +96,7 @@ namespace StereoCell.Editor
             };
         }
 
-        /// <summary>The transfer functions of all channels, a row each.</summary>
+        /// <summary>A texture with one row for each transfer function of each channel.</summary>
         Texture2D MakeTable()
         {
             var rows = new List<byte>();
@@ -119,13 +120,13 @@ namespace StereoCell.Editor
             return texture;
         }
 
-        /// <param name="middle">Of the specimen, where its root is.</param>
+        /// <param name="middle">Metres. The centre of the specimen, where its root is.</param>
         void AddTile(Transform root, Vector3 middle, TileEntry entry, Specimen specimen)
         {
             var pivot = Placement.CentreOf(entry.Bounds);
             var tile = Child(root, entry.Id, pivot - middle).AddComponent<Tile>();
             var collider = tile.gameObject.AddComponent<BoxCollider>();
-            collider.isTrigger = true;  // it is for the gaze, nothing shall bump into it
+            collider.isTrigger = true;  // only the ray of the gaze hits it; it does not stop other objects
             collider.size = Placement.SizeOf(entry.Bounds);
             tile.surfaces = Child(tile.transform, "surfaces", Vector3.zero);
             tile.volume = Child(tile.transform, "volume", Vector3.zero);

@@ -9,8 +9,9 @@ using Object = UnityEngine.Object;
 namespace StereoCell.Editor
 {
     /// <summary>
-    /// Imports a `.stereocell` file, a link to a bundle's folder or a zip file of it, as a prefab. The import is made anew
-    /// when the bundle changes; it writes no file, and changes none of the project's own materials, variants and scenes.
+    /// Imports a `.stereocell` file as a prefab. The file is a link to a bundle's folder, or a zip file of this folder.
+    /// The import runs again when the bundle changes. It writes no file, and it leaves the project's own materials,
+    /// variants and scenes as they are.
     /// </summary>
     [ScriptedImporter(1, Ending)]
     public sealed class SpecimenImporter : ScriptedImporter
@@ -22,7 +23,7 @@ namespace StereoCell.Editor
         public override void OnImportAsset(AssetImportContext ctx)
         {
             ctx.DependsOnSourceAsset(SpecimenBuilder.ShaderPath);
-            ctx.DependsOnCustomDependency(BundleWatcher.PipelineName);  // glTFast's materials are those of a pipeline
+            ctx.DependsOnCustomDependency(BundleWatcher.PipelineName);  // glTFast's materials are for one pipeline
             GameObject root = null;
             try
             {
@@ -46,7 +47,7 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>What a channel's surfaces are called in <see cref="AssetImporter.AddRemap"/>.</summary>
+        /// <summary>The key of a channel's surface material in <see cref="AssetImporter.AddRemap"/>.</summary>
         public static SourceAssetIdentifier MaterialOf(string channel)
         {
             return new SourceAssetIdentifier(typeof(Material), channel);

@@ -5,7 +5,8 @@ using UnityEngine;
 
 namespace StereoCell.Editor
 {
-    /// <summary>The importer's Inspector: its options, and a material of the project's own for each channel.</summary>
+    /// <summary>The importer's Inspector: its options, and a field for each channel to use one of the project's own
+    /// materials.</summary>
     [CustomEditor(typeof(SpecimenImporter))]
     public sealed class SpecimenImporterEditor : ScriptedImporterEditor
     {

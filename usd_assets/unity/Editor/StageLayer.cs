@@ -7,7 +7,7 @@ using UnityEngine;
 
 namespace StereoCell.Editor
 {
-    /// <summary>What is edited of a channel; null for what stays as it was built.</summary>
+    /// <summary>The edits of one channel. A value that was not edited is null.</summary>
     public sealed class ChannelEdit
     {
         public string Id;
@@ -17,10 +17,10 @@ namespace StereoCell.Editor
 
         public bool? IsVisible;
 
-        /// <summary>The transfer function that is chosen.</summary>
+        /// <summary>Name of the chosen transfer function.</summary>
         public string Function;
 
-        /// <summary>Points of transfer functions by their names.</summary>
+        /// <summary>Points of the edited transfer functions, by name.</summary>
         public Dictionary<string, List<Vector2>> Points = new Dictionary<string, List<Vector2>>();
 
         public bool IsEmpty
@@ -30,12 +30,12 @@ namespace StereoCell.Editor
     }
 
     /// <summary>
-    /// A USD layer over a stage, in which edits of channels stand: `stereocell bundle OUT --stage layer.usda` takes them
-    /// over. Nothing else is in it, so the stage keeps its own values for the rest.
+    /// Writes edits of channels as a USD layer over the stage, for `stereocell bundle OUT --stage layer.usda`. The layer
+    /// holds only edited values; all others come from the stage.
     /// </summary>
     public static class StageLayer
     {
-        /// <param name="layer">The path of the layer, from which that of the stage is reckoned.</param>
+        /// <param name="layer">Path of the layer. The layer refers to the stage by a path relative to it.</param>
         public static string Text(string layer, string stage, IEnumerable<ChannelEdit> edits)
         {
             var all = edits.Where(edit => !edit.IsEmpty).ToList();

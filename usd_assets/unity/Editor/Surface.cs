@@ -9,13 +9,14 @@ using Object = UnityEngine.Object;
 
 namespace StereoCell.Editor
 {
-    /// <summary>A surface's file, read by glTFast.</summary>
+    /// <summary>The objects that glTFast makes of a surface's file.</summary>
     sealed class Surface
     {
         public GameObject Made;
         public Texture2D[] Textures;
 
-        /// <summary>The file's materials as it describes them, so that equal ones become one; null if they have images.</summary>
+        /// <summary>The JSON of the file's materials, so that equal materials can be shared; null if the file has
+        /// images.</summary>
         public string MaterialText;
 
         /// <exception cref="BundleException">glTFast can't read the file.</exception>
@@ -45,7 +46,7 @@ namespace StereoCell.Editor
 
         static string MaterialsOf(byte[] glb)
         {
-            const int headBytes = 20;  // of the file and of its first chunk, which is JSON
+            const int headBytes = 20;  // headers of the file and of its first chunk, which is JSON
             if (glb.Length < headBytes) return null;
             var json = JObject.Parse(Encoding.UTF8.GetString(glb, headBytes, BitConverter.ToInt32(glb, 12)));
             return json["textures"] == null && json["materials"] != null ? json["materials"].ToString() : null;

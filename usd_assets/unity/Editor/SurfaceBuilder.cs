@@ -16,7 +16,8 @@ namespace StereoCell.Editor
         readonly Dictionary<string, Material> materials = new Dictionary<string, Material>();
         readonly HashSet<string> channelsWithMaterial = new HashSet<string>();
 
-        /// <param name="ownMaterial">The project's material for a channel's surfaces; null for those of the bundle.</param>
+        /// <param name="ownMaterial">Returns the project's material for a channel's surfaces; null keeps the bundle's
+        /// materials.</param>
         public SurfaceBuilder(Bundle bundle, ImportOptions options, Func<string, Material> ownMaterial, Action<string, Object> addAsset)
         {
             this.bundle = bundle;
@@ -25,7 +26,7 @@ namespace StereoCell.Editor
             this.addAsset = addAsset;
         }
 
-        /// <param name="pivot">Where the tile's own object is, metres.</param>
+        /// <param name="pivot">Metres. Position of the tile's object in the specimen.</param>
         public GameObject AddSurface(Transform parent, ChannelEntry channel, TileEntry tile, List<Level> levels, Vector3 pivot)
         {
             var holder = new GameObject(channel.Id);
@@ -39,7 +40,7 @@ namespace StereoCell.Editor
                 var surface = Surface.Read(levels[i].Path, bundle.Read(levels[i].Path));
                 surface.Made.name = "lod" + i;
                 surface.Made.transform.SetParent(holder.transform, false);
-                surface.Made.transform.localPosition -= pivot;  // a file's places are the specimen's
+                surface.Made.transform.localPosition -= pivot;  // the file has the specimen's coordinates
                 AddParts(surface, channel.Id, tile.Id, channel.Id + " " + tile.Id + " lod" + i);
                 lods[i] = new LOD(heights[i], surface.Made.GetComponentsInChildren<Renderer>());
             }
@@ -50,7 +51,7 @@ namespace StereoCell.Editor
             return holder;
         }
 
-        /// <summary>Make a file's meshes, images and materials part of the asset.</summary>
+        /// <summary>Add a file's meshes, images and materials to the asset.</summary>
         void AddParts(Surface surface, string channel, string tile, string name)
         {
             var filters = surface.Made.GetComponentsInChildren<MeshFilter>(true);
@@ -73,7 +74,7 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>The material for all surfaces of a channel whose files describe the same one.</summary>
+        /// <summary>The one material for all surfaces of a channel whose files describe the same material.</summary>
         Material Shared(Material made, string text, string channel, string tile, string name)
         {
             if (made == null) return null;
@@ -86,7 +87,7 @@ namespace StereoCell.Editor
             var key = channel + " " + text;
             if (materials.TryGetValue(key, out found)) return found;
             materials.Add(key, made);
-            // the first one is the channel's; a tile with a material of its own has one of its own name
+            // The channel's first material gets its name. A different material gets the name of its tile as well.
             made.name = channelsWithMaterial.Add(channel) ? channel : channel + " " + tile;
             addAsset("material " + (made.name == channel ? channel : name), made);
             return made;

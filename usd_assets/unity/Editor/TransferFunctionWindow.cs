@@ -9,8 +9,9 @@ using UnityEngine;
 namespace StereoCell.Editor
 {
     /// <summary>
-    /// Edits a specimen's transfer functions, as a curve of opacity and as a gradient of colour and opacity. The scene shows
-    /// each change at once. *Write layer...* writes the edits of colour, opacity, visibility and choice as a USD layer.
+    /// Edits a specimen's transfer functions as a curve of opacity and as a gradient of colour and opacity. The scene shows
+    /// each change at once. *Write layer...* writes a USD layer with the edits of colour, opacity and visibility, and with
+    /// the chosen functions.
     /// </summary>
     public sealed class TransferFunctionWindow : EditorWindow
     {
@@ -19,7 +20,7 @@ namespace StereoCell.Editor
         [SerializeField] Specimen specimen;
         [SerializeField] string note = "";
 
-        /// <summary>Points that were changed: by channel, then by function.</summary>
+        /// <summary>Edited points, by channel and then by function.</summary>
         readonly Dictionary<string, Dictionary<string, List<Vector2>>> edited = new Dictionary<string, Dictionary<string, List<Vector2>>>();
         Vector2 scroll;
 
@@ -81,7 +82,8 @@ namespace StereoCell.Editor
             try
             {
                 channel.color = OpacityPoints.ColorOf(gradient);
-                // a gradient has eight keys at most, so a function of more points stays where only the colour is new
+                // A gradient has at most eight keys. If only the colour was edited, the points are left alone, so a
+                // function with more points does not lose any.
                 var points = OpacityPoints.OfGradient(gradient);
                 if (!OpacityPoints.OfGradient(offered).SequenceEqual(points)) Set(channel, points);
                 note = "";
@@ -117,7 +119,7 @@ namespace StereoCell.Editor
             note = WriteLayer(layer, stage);
         }
 
-        /// <summary>Returns the line that says what was written, and what to do with it.</summary>
+        /// <summary>Write the edits as a layer. Returns a line for the user about the file and the next step.</summary>
         public string WriteLayer(string layer, string stage)
         {
             var edits = Edits();
@@ -142,7 +144,8 @@ namespace StereoCell.Editor
             return edit;
         }
 
-        /// <summary>The stage beside a linked bundle: OUT/bundle was made of OUT/stage. Null if there is none.</summary>
+        /// <summary>Path of the stage beside a linked bundle: OUT/stage/stage.usda for OUT/bundle. Null if there is
+        /// none.</summary>
         static string StageOf(Specimen specimen)
         {
             var box = specimen.GetComponentsInChildren<VolumeBox>(true).FirstOrDefault();

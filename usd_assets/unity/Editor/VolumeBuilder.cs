@@ -10,7 +10,8 @@ using Object = UnityEngine.Object;
 
 namespace StereoCell.Editor
 {
-    /// <summary>Makes the boxes that are marched. Their voxels stay in files: <see cref="VolumeCache"/>.</summary>
+    /// <summary>Makes the boxes in which volumes are drawn. Their voxels are not part of the asset; they stay in files of
+    /// <see cref="VolumeCache"/>.</summary>
     sealed class VolumeBuilder
     {
         const int ChannelsOfBox = 4;
@@ -23,7 +24,7 @@ namespace StereoCell.Editor
         readonly Action<string, Object> addAsset;
         readonly Dictionary<VolumeEntry, Placement> places = new Dictionary<VolumeEntry, Placement>();
 
-        /// <param name="guid">Of the asset that is imported.</param>
+        /// <param name="guid">GUID of the imported asset.</param>
         public VolumeBuilder(Bundle bundle, ImportOptions options, string guid, Shader shader, Texture2D table, Action<string, Object> addAsset)
         {
             this.bundle = bundle;
@@ -35,7 +36,7 @@ namespace StereoCell.Editor
             foreach (var volume in bundle.Channels.SelectMany(channel => channel.Volumes.Values)) places.Add(volume, new Placement(volume));
         }
 
-        /// <param name="pivot">Where the tile's own object is, metres.</param>
+        /// <param name="pivot">Metres. Position of the tile's object in the specimen.</param>
         public void AddBoxes(Transform parent, string tile, Vector3 pivot)
         {
             var boxes = Boxes(tile);
@@ -45,7 +46,8 @@ namespace StereoCell.Editor
             for (var i = 0; i < boxes.Count; i++) AddBox(parent, tile, boxes[i], tile + (i > 0 ? "_" + i : ""), level, pivot);
         }
 
-        /// <summary>Up to four channels that lie alike share a texture and a march.</summary>
+        /// <summary>Group the channels of a tile. Up to four channels with the same grid share a texture and are drawn in
+        /// one pass.</summary>
         List<List<int>> Boxes(string tile)
         {
             var boxes = new List<List<int>>();
@@ -93,7 +95,8 @@ namespace StereoCell.Editor
             box.file = name + "-" + ContentOf(box.sources, level) + ".volume";
         }
 
-        /// <summary>Digits that differ wherever the voxels do, so that a file of older voxels is never taken for these.</summary>
+        /// <summary>Hexadecimal digits from a hash of the voxels' files. A file with older voxels has another name, so it is
+        /// never used by mistake.</summary>
         string ContentOf(string[] sources, int level)
         {
             var text = string.Join(" ", sources.Select(path => bundle.HashOf(path)).ToArray()) + " " + level;
@@ -117,7 +120,8 @@ namespace StereoCell.Editor
             for (var row = 0; row < 3; row++) material.SetVector("_ToBox" + row, place.ToBox[row]);
             material.SetFloat("_Voxel", place.Voxel);
             material.SetFloat("_MinStep", place.Voxel * (1 << level));
-            // each tile takes a step at least, however short the ray's way through it
+            // Each tile on a ray takes at least one step, however short the ray's path through it. Therefore one step is
+            // reserved for each other tile.
             material.SetFloat("_Spare", Math.Min(bundle.Tiles.Count - 1, 50));
             return material;
         }
@@ -125,8 +129,8 @@ namespace StereoCell.Editor
         static Mesh BoxMesh(Placement place)
         {
             var mesh = new Mesh { name = "box", vertices = place.Corners };
-            // clockwise from outside, Unity's front; the corners keep their order under a rotation, a matrix
-            // that mirrors turns them over
+            // Seen from outside, corners run clockwise, which is a front face in Unity. A matrix that mirrors the box
+            // reverses this order.
             int[] triangles =
             {
                 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,

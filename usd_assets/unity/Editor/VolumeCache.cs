@@ -7,9 +7,9 @@ using UnityEditor;
 namespace StereoCell.Editor
 {
     /// <summary>
-    /// Makes the files of voxels that the runtime reads, out of a bundle: for play in the editor when a box is first
-    /// shown, for a player when it is built. They lie in Library/StereoCell, are named after their content, and can be
-    /// deleted at any time.
+    /// Converts volumes of a bundle to the voxel files that the runtime reads. In the editor, a file is made when its box
+    /// is first shown. For a player, all files are made during the build. They lie in Library/StereoCell, are named after
+    /// their content, and can be deleted at any time.
     /// </summary>
     [InitializeOnLoad]
     public static class VolumeCache
@@ -21,10 +21,10 @@ namespace StereoCell.Editor
             VolumePlace.Maker = MakerOf;
         }
 
-        /// <summary>The function that makes a box's file, on any thread, and returns its path.</summary>
+        /// <summary>A function that makes a box's file and returns its path. The function may run on any thread.</summary>
         public static Func<string> MakerOf(VolumeBox box)
         {
-            // Unity's own objects are asked here, on the main thread
+            // Unity's objects may be read only on the main thread, so their values are copied here.
             string asset = AssetDatabase.GUIDToAssetPath(box.specimenGuid), file = box.file;
             var sources = box.sources;
             var level = box.level;

@@ -8,8 +8,8 @@ using UnityEngine;
 
 namespace StereoCell.Editor
 {
-    /// <summary>Adds the voxels of the specimens that a player uses to its streaming assets. The project's own folder of
-    /// that name stays as it is.</summary>
+    /// <summary>Adds the voxel files of the specimens in a player to its streaming assets. The project's own folder
+    /// StreamingAssets stays as it is.</summary>
     public sealed class VolumesOfBuild : BuildPlayerProcessor
     {
         public override void PrepareForBuild(BuildPlayerContext buildPlayerContext)
@@ -20,7 +20,7 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>The files of all boxes that these scenes, and the project's Resources folders, refer to.</summary>
+        /// <summary>The voxel files of all boxes to which these scenes and the project's Resources folders refer.</summary>
         public static IEnumerable<string> FilesOf(string[] scenes)
         {
             var roots = new List<string>(scenes ?? new string[0]);

@@ -5,19 +5,19 @@ using System.IO;
 namespace StereoCell.Editor
 {
     /// <summary>
-    /// Unpacks a Zstandard frame (RFC 8878), whose size is known beforehand. Unity brings no decoder, and a
-    /// bundle's volumes are such frames. No dictionaries; the checksum, where there is one, is passed over: the
-    /// importer has checked the file's SHA-256. Anything that is not as the RFC says ends in InvalidDataException.
+    /// Decompresses a Zstandard frame (RFC 8878) of known size. The volumes of a bundle are such frames, and Unity has no
+    /// decoder for them. Dictionaries are not supported. A checksum in the frame is ignored, because the importer has
+    /// already checked the SHA-256 of the file. A frame that breaks the RFC ends in InvalidDataException.
     /// </summary>
     public static partial class Zstd
     {
         const uint Magic = 0xFD2FB528;
         const int MostOfBlock = 128 << 10;
 
-        /// <param name="data">Holds the frame.</param>
+        /// <param name="data">Bytes that contain the frame.</param>
         /// <param name="offset">First byte of the frame.</param>
-        /// <param name="length">Bytes of the frame.</param>
-        /// <param name="size">Bytes once unpacked.</param>
+        /// <param name="length">Length of the frame, bytes.</param>
+        /// <param name="size">Length of the decompressed data, bytes.</param>
         public static byte[] Unpack(byte[] data, int offset, int length, int size)
         {
             if (offset < 0 || length < 0 || offset > data.Length - length) throw Broken("beyond the file");
@@ -25,7 +25,7 @@ namespace StereoCell.Editor
             {
                 return new Frame(data, offset, offset + length, size).Unpack();
             }
-            catch (IndexOutOfRangeException)  // of an array, so of what a damaged frame asked for
+            catch (IndexOutOfRangeException)  // a damaged frame reads or writes beyond an array
             {
                 throw Broken("ends too early");
             }
@@ -72,8 +72,8 @@ namespace StereoCell.Editor
             1, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16,
         };
 
-        /// <summary>The least length of each code: each begins where the one before ends, up to the last that
-        /// stands for few.</summary>
+        /// <summary>The smallest length of each code. A code with b extra bits covers 2^b lengths, and the next code starts
+        /// after them.</summary>
         static int[] Bases(byte[] bits, int first)
         {
             var bases = new int[bits.Length];
@@ -93,12 +93,12 @@ namespace StereoCell.Editor
             readonly int end;
             readonly byte[] output;
             int at;
-            int done;  // bytes of the output
+            int done;  // bytes of the output that are written
             Huffman huffman;
             Fse literals;
             Fse offsets;
             Fse matches;
-            readonly int[] last = { 1, 4, 8 };  // offsets
+            readonly int[] last = { 1, 4, 8 };  // the three most recent offsets, with the initial values of the RFC
 
             public Frame(byte[] data, int start, int end, int size)
             {
@@ -123,7 +123,7 @@ namespace StereoCell.Editor
                 var descriptor = (int)Number(1);
                 var isSingle = (descriptor & 32) != 0;
                 if ((descriptor & 11) != 0) throw Broken("it asks for a dictionary");
-                if (!isSingle) Number(1);  // the window: all output is at hand
+                if (!isSingle) Number(1);  // the window's size is not needed: the whole output stays in memory
                 var width = descriptor >> 6;
                 var bytes = width == 0 ? (isSingle ? 1 : 0) : 1 << width;
                 var stated = Number(bytes) + (bytes == 2 ? 256 : 0);
@@ -261,7 +261,8 @@ namespace StereoCell.Editor
                 Copy(from, used, from.Length - used, 1, 0);
             }
 
-            /// <summary>1 to 3 stand for the last offsets; after no literals, for the next ones of them.</summary>
+            /// <summary>The offset for a stored value. Values 1 to 3 repeat a recent offset. If no literals came before the
+            /// match, they are shifted by one, and 3 means the last offset minus 1 (RFC 8878, 3.1.1.5).</summary>
             int OffsetOf(int value, int plain)
             {
                 if (value > 3)

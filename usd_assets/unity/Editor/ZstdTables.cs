@@ -3,27 +3,29 @@ using System;
 
 namespace StereoCell.Editor
 {
-    /// <summary>What a frame's blocks are coded by: bits that are read backwards, finite-state entropy, Huffman.</summary>
+    /// <summary>The codes inside a frame's blocks: bit streams that are read backwards, tables of finite-state entropy, and
+    /// Huffman tables.</summary>
     public static partial class Zstd
     {
-        /// <summary>Reads bits from the end of a part towards its start, as zstd writes its streams.</summary>
+        /// <summary>Reads bits from the end of a stream towards its start, the direction of zstd's bit streams.</summary>
         sealed class Backwards
         {
             readonly byte[] data;
             readonly int start;
-            int bit;  // that are left, from the part's first
+            int bit;  // number of bits that are left
 
             public Backwards(byte[] data, int start, int end)
             {
                 this.data = data;
                 this.start = start;
                 if (end <= start || data[end - 1] == 0) throw Broken("a stream without an end");
-                bit = 8 * (end - start - 1) + HighBit(data[end - 1]);  // below the mark, the highest bit
+                bit = 8 * (end - start - 1) + HighBit(data[end - 1]);  // the highest bit is an end mark, not data
             }
 
             public int Left { get { return bit; } }
 
-            /// <summary>Bits before the first are 0, which the last look-ups ask for.</summary>
+            /// <summary>Read the next bits. Bits before the start of the stream count as 0; the last look-ups need
+            /// them.</summary>
             public int Read(int count)
             {
                 bit -= count;
@@ -55,7 +57,8 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>A table of finite-state entropy: symbol, bits to the next state, and that state's base.</summary>
+        /// <summary>A table of finite-state entropy. Each state has a symbol, the number of bits to read for the next state,
+        /// and a base that is added to these bits.</summary>
         sealed class Fse
         {
             public readonly int Log;
@@ -74,7 +77,7 @@ namespace StereoCell.Editor
                 var high = size;
                 for (var s = 0; s < counts.Length; s++)
                 {
-                    if (counts[s] == -1)  // less than one: a cell at the end
+                    if (counts[s] == -1)  // a probability below 1 gets one cell at the end
                     {
                         Symbol[--high] = (byte)s;
                         next[s] = 1;
@@ -101,7 +104,7 @@ namespace StereoCell.Editor
                 }
             }
 
-            /// <summary>A single symbol, which takes no bits.</summary>
+            /// <summary>A table with one symbol, for which no bits are read.</summary>
             public Fse(byte symbol)
             {
                 Symbol = new[] { symbol };
@@ -109,7 +112,8 @@ namespace StereoCell.Editor
                 Base = new ushort[1];
             }
 
-            /// <summary>Reads the table's description at <paramref name="at"/>, which moves behind it.</summary>
+            /// <summary>Read a table's description at <paramref name="at"/>, and move <paramref name="at"/> behind
+            /// it.</summary>
             public static Fse Read(byte[] data, ref int at, int end, int symbols, int mostLog)
             {
                 var bit = 0;
@@ -132,7 +136,7 @@ namespace StereoCell.Editor
                 while (left > 1)
                 {
                     if (symbol >= symbols) throw Broken("too many symbols");
-                    var width = HighBit((uint)left) + 1;  // of the values 0 .. left
+                    var width = HighBit((uint)left) + 1;  // bits of the values 0 .. left
                     var value = bits(width - 1);
                     var small = (1 << width) - 1 - left;
                     if (value >= small)
@@ -157,7 +161,7 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>A table of Huffman's: symbol and bits by the next <see cref="Log"/> bits.</summary>
+        /// <summary>A Huffman table: the next <see cref="Log"/> bits give a symbol and the length of its code.</summary>
         sealed class Huffman
         {
             public readonly int Log;
@@ -176,7 +180,7 @@ namespace StereoCell.Editor
                 Log = HighBit((uint)total) + 1;
                 var rest = (1 << Log) - total;
                 if (Log > 11 || (rest & rest - 1) != 0) throw Broken("codes that do not add up");
-                weights[count] = (byte)(HighBit((uint)rest) + 1);  // the last symbol's is not stored
+                weights[count] = (byte)(HighBit((uint)rest) + 1);  // the last weight is not stored; it follows
                 Symbol = new byte[1 << Log];
                 Bits = new byte[1 << Log];
                 var at = 0;
@@ -212,7 +216,7 @@ namespace StereoCell.Editor
                 var table = Fse.Read(data, ref at, stop, 13, 6);
                 var stream = new Backwards(data, at, stop);
                 int a = stream.Read(table.Log), b = stream.Read(table.Log);
-                for (;;)  // two states in turn, until the bits are used up
+                for (;;)  // two states alternate until all bits are read
                 {
                     if (count > 253) throw Broken("too many weights");
                     weights[count++] = table.Symbol[a];

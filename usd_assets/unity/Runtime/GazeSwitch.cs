@@ -4,20 +4,21 @@ using UnityEngine;
 
 namespace StereoCell
 {
-    /// <summary>How long one target has been gazed at. Plain data.</summary>
+    /// <summary>The time for which one target has been gazed at. Plain data.</summary>
     public struct Dwell
     {
-        /// <summary>Longest time that a frame counts, s: a stall is no gaze.</summary>
+        /// <summary>Seconds. Longest time that one frame adds, so that a stall does not count as a gaze.</summary>
         const float LongestFrame = 0.1f;
 
         public object Target;
         public float Elapsed;
 
-        /// <summary>A target that has fired is done with until the gaze leaves it.</summary>
+        /// <summary>Whether the dwell has fired for this target. It does not fire again until the gaze leaves the
+        /// target.</summary>
         public bool HasFired;
 
-        /// <summary>Go on by a frame; whether it is the one on which the dwell fires. The frame on which a target
-        /// is first seen starts its clock and adds nothing to it.</summary>
+        /// <summary>Advance by one frame. Returns whether the dwell fires on this frame. The first frame on a target
+        /// starts its clock and adds no time.</summary>
         public bool Advance(object target, float seconds, float needed)
         {
             if (!ReferenceEquals(target, Target))
@@ -32,14 +33,14 @@ namespace StereoCell
             return HasFired = Elapsed >= needed;
         }
 
-        /// <summary>Share of a ring that is filled, 0 to 1; 0 once it has fired.</summary>
+        /// <summary>0 to 1. The share of the needed time that has passed; 0 after the dwell has fired.</summary>
         public float Progress(float needed)
         {
             return Target == null || HasFired ? 0 : Math.Min(1, Elapsed / needed);
         }
     }
 
-    /// <summary>A tile that is gazed at for 1.5 s switches from surfaces to its volume, and back.</summary>
+    /// <summary>Switches a tile between its surfaces and its volume when it has been gazed at for 1.5 s.</summary>
     [DisallowMultipleComponent, AddComponentMenu("StereoCell/Gaze Switch")]
     public sealed class GazeSwitch : MonoBehaviour
     {
@@ -54,7 +55,7 @@ namespace StereoCell
 
         Dwell state;
 
-        /// <summary>For a reticle: 0 to 1.</summary>
+        /// <summary>0 to 1. Progress of the dwell, for a reticle.</summary>
         public float Progress
         {
             get { return state.Progress(dwell); }
@@ -66,7 +67,8 @@ namespace StereoCell
             get { return state.Target as Tile; }
         }
 
-        /// <summary>Switch the tile that is looked at now, for a button; the dwell is then done with it.</summary>
+        /// <summary>Switch the tile that is looked at now, for a button. The dwell then does not fire until the
+        /// gaze has left this tile.</summary>
         public void Press()
         {
             if (Target == null) return;

@@ -3,18 +3,19 @@ using System.Collections.Generic;
 
 namespace StereoCell
 {
-    /// <summary>Which items stay in memory: those that were wanted last, as many as fit. Plain data.</summary>
+    /// <summary>Decides which items stay in memory: the most recently requested ones, as many as fit. Plain
+    /// data.</summary>
     public sealed class Residency<T> where T : class
     {
-        readonly List<T> items = new List<T>();  // from the one that was wanted first
+        readonly List<T> items = new List<T>();  // least recently requested first
         readonly List<long> bytes = new List<long>();
 
-        /// <summary>Most bytes of all items; one item stays, however large it is.</summary>
+        /// <summary>Bytes. Limit for all items together. The newest item stays even if it alone is larger.</summary>
         public long Budget;
 
         public long Bytes { get; private set; }
 
-        /// <summary>From the item that was wanted first to the one that was wanted last.</summary>
+        /// <summary>The items, least recently requested first.</summary>
         public readonly IList<T> Items;
 
         public Residency()
@@ -22,7 +23,8 @@ namespace StereoCell
             Items = items.AsReadOnly();
         }
 
-        /// <summary>Make an item the last that was wanted. Returns the items that have to leave before it is loaded.</summary>
+        /// <summary>Make an item the most recently requested one. Returns the items to unload before it is
+        /// loaded.</summary>
         public List<T> Admit(T item, long itemBytes)
         {
             Remove(item);

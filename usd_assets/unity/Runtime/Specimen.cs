@@ -5,7 +5,7 @@ using UnityEngine;
 
 namespace StereoCell
 {
-    /// <summary>A channel of the specimen: what it is called, and how it looks.</summary>
+    /// <summary>A channel of the specimen: its name and its appearance.</summary>
     [Serializable]
     public sealed class Channel
     {
@@ -14,7 +14,7 @@ namespace StereoCell
 
         public Color color = Color.white;
 
-        // as imported: surfaces of this colour keep their materials as they are, and an edit is what differs from these
+        // Values at the import. An edit is a difference from them. Surfaces with the imported colour keep their material.
         [HideInInspector] public Color importedColor;
         [HideInInspector] public bool importedVisible = true;
         [HideInInspector] public int importedFunction;
@@ -29,16 +29,16 @@ namespace StereoCell
 
         [HideInInspector] public int firstRow;
 
-        /// <summary>Objects that hold the channel's surfaces, one a tile.</summary>
+        /// <summary>The objects with the channel's surfaces, one for each tile.</summary>
         [HideInInspector] public List<GameObject> surfaces = new List<GameObject>();
     }
 
-    /// <summary>The whole: shows and hides channels, chooses colours and transfer functions, and keeps the voxels of
-    /// the tiles that were looked at last in memory.</summary>
+    /// <summary>The whole specimen. It shows and hides channels, sets colours and transfer functions, and keeps the
+    /// voxels of the most recently viewed tiles in memory.</summary>
     [ExecuteAlways, DisallowMultipleComponent, AddComponentMenu("StereoCell/Specimen")]
     public sealed class Specimen : MonoBehaviour
     {
-        /// <summary>Bytes that are uploaded in a frame: about 2 ms on a phone.</summary>
+        /// <summary>Bytes to upload in one frame, which takes about 2 ms on a phone.</summary>
         const long UploadBytes = 2 << 20;
 
         public List<Channel> channels = new List<Channel>();
@@ -59,12 +59,12 @@ namespace StereoCell
         public float budget = 40;
 
         readonly Residency<Tile> residency = new Residency<Tile>();
-        Texture2D ownTable;  // the table with the functions that were changed here
+        Texture2D ownTable;  // copy of the table with edited functions
         SurfaceColors colors;
-        VolumeBox[] boxes;  // kept, so that a frame allocates nothing
+        VolumeBox[] boxes;  // kept between frames, so that a frame allocates no memory
         float[] nearness;
 
-        /// <summary>The channel of this id or name; null if there is none.</summary>
+        /// <summary>The channel with this id or name; null if there is none.</summary>
         public Channel Find(string idOrName)
         {
             return channels.Find(channel => channel.id == idOrName || channel.name == idOrName);
@@ -91,8 +91,8 @@ namespace StereoCell
             Apply();
         }
 
-        /// <summary>Change a transfer function until the scene is closed: the imported table stays.</summary>
-        /// <param name="opacity">0 to 255, for 256 intensities.</param>
+        /// <summary>Change a transfer function until the scene is closed. The imported table is not changed.</summary>
+        /// <param name="opacity">Opacities 0 to 255, one for each of 256 intensities.</param>
         public void SetOpacity(string channel, string function, byte[] opacity)
         {
             var known = Known(channel);
@@ -115,20 +115,20 @@ namespace StereoCell
             Apply();
         }
 
-        /// <summary>The transfer functions that are drawn.</summary>
+        /// <summary>The table of transfer functions in use: the edited copy, or the imported table.</summary>
         public Texture2D Table
         {
             get { return ownTable != null ? ownTable : table; }
         }
 
-        /// <summary>The most memory that volumes take now, bytes.</summary>
+        /// <summary>Bytes. The peak memory of the volumes that are loaded or being loaded.</summary>
         public long VolumeBytes
         {
             get { return residency.Bytes; }
         }
 
-        /// <summary>Load the voxels of a tile. Tiles that were wanted longest ago are unloaded first, where they do not fit
-        /// together.</summary>
+        /// <summary>Load the voxels of a tile. If they do not fit into the budget, the least recently requested tiles are
+        /// unloaded first.</summary>
         public void Load(Tile tile)
         {
             residency.Budget = (long)(budget * 1e6f);
@@ -163,7 +163,7 @@ namespace StereoCell
 
         void OnValidate()
         {
-            if (isActiveAndEnabled) Apply();  // the asset itself is in no scene, and draws nothing
+            if (isActiveAndEnabled) Apply();  // the asset itself is not in a scene and is not drawn
         }
 
         void Update()
@@ -175,7 +175,7 @@ namespace StereoCell
             }
         }
 
-        /// <summary>Load the tiles that are to be shown as volumes, in their order, while they fit.</summary>
+        /// <summary>Load the tiles that show volumes, in their order. A tile that does not fit shows its surfaces.</summary>
         void OpenTiles()
         {
             long bytes = 0;
@@ -195,7 +195,7 @@ namespace StereoCell
             }
         }
 
-        /// <summary>Carry to the renderers what was changed in the fields.</summary>
+        /// <summary>Apply the values of the fields to all renderers.</summary>
         public void Apply()
         {
             if (colors == null) colors = new SurfaceColors();
@@ -206,7 +206,7 @@ namespace StereoCell
                     if (surface == null) continue;
                     foreach (var renderer in surface.GetComponentsInChildren<Renderer>(true))
                     {
-                        renderer.enabled = channel.isVisible;  // not SetActive: this may run in OnValidate
+                        renderer.enabled = channel.isVisible;  // SetActive is not allowed in OnValidate
                         colors.Apply(renderer, channel);
                     }
                 }
@@ -222,13 +222,14 @@ namespace StereoCell
             if (Camera.main != null) SortFrom(Camera.main.transform.position);
         }
 
-        /// <summary>Blend volumes from the farthest, for an eye in the world: done for the main camera by itself.</summary>
+        /// <summary>Order the volumes for blending, farthest first, as seen from a point of the world. For the main camera
+        /// this happens in each frame.</summary>
         public void SortFrom(Vector3 eye)
         {
             if (boxes == null || Array.Exists(boxes, box => box == null)) Apply();  // some were removed
             for (var i = 0; i < boxes.Length; i++) nearness[i] = -boxes[i].DistanceFrom(eye);
             Array.Sort(nearness, boxes);
-            // up to 0, so that other transparent objects are blended after them
+            // The highest order is 0, so that other transparent objects are blended after all volumes.
             for (var i = 0; i < boxes.Length; i++) boxes[i].GetComponent<Renderer>().sortingOrder = i + 1 - boxes.Length;
         }
 

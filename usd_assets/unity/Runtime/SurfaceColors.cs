@@ -5,13 +5,13 @@ using UnityEngine;
 namespace StereoCell
 {
     /// <summary>
-    /// Gives surfaces another colour than they were imported with. In play mode the renderers of a channel share a copy
-    /// of their material, which the scriptable pipelines batch; in the editor they have a property block, so that no
-    /// asset and no scene is changed.
+    /// Changes the imported colour of surfaces. In play mode, the renderers of a channel share a copy of their material,
+    /// which the scriptable pipelines can batch. In the editor, they get a property block, so that no asset and no scene
+    /// is changed.
     /// </summary>
     sealed class SurfaceColors
     {
-        static readonly int BaseColor = Shader.PropertyToID("baseColorFactor");  // of glTFast's materials
+        static readonly int BaseColor = Shader.PropertyToID("baseColorFactor");  // a property of glTFast's materials
 
         readonly Dictionary<Renderer, Material> imported = new Dictionary<Renderer, Material>();
         readonly Dictionary<KeyValuePair<Channel, Material>, Material> copies = new Dictionary<KeyValuePair<Channel, Material>, Material>();
@@ -29,7 +29,7 @@ namespace StereoCell
             else
             {
                 if (block == null) block = new MaterialPropertyBlock();
-                block.SetColor(BaseColor, channel.color);  // Unity makes it linear
+                block.SetColor(BaseColor, channel.color);  // Unity converts it to linear
                 renderer.SetPropertyBlock(block);
             }
         }

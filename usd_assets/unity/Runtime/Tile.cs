@@ -4,8 +4,8 @@ using UnityEngine;
 
 namespace StereoCell
 {
-    /// <summary>A spatial tile, shown by its surfaces, by its volume, or by both. Its voxels are loaded when they are to
-    /// be shown; until then its surfaces stay.</summary>
+    /// <summary>A spatial tile that shows its surfaces, its volume, or both. The voxels are loaded when the volume is
+    /// first requested. The tile keeps its surfaces until the volume is complete.</summary>
     [DisallowMultipleComponent, AddComponentMenu("StereoCell/Tile")]
     public sealed class Tile : MonoBehaviour
     {
@@ -20,10 +20,10 @@ namespace StereoCell
             get { return volume != null && volume.activeSelf; }
         }
 
-        /// <summary>Whether its voxels are on their way.</summary>
+        /// <summary>Whether the tile's voxels are being loaded.</summary>
         public bool IsLoading { get; private set; }
 
-        /// <summary>Share of its voxels that are there, 0 to 1.</summary>
+        /// <summary>0 to 1. The share of the visible channels' voxels that is loaded.</summary>
         public float Progress
         {
             get
@@ -39,7 +39,7 @@ namespace StereoCell
             }
         }
 
-        /// <summary>The most memory that its voxels take, while they are loaded.</summary>
+        /// <summary>Bytes. The peak memory of the tile's voxels, which is reached during loading.</summary>
         public long PeakBytes
         {
             get
@@ -64,7 +64,7 @@ namespace StereoCell
             specimen.Load(this);
         }
 
-        /// <summary>From surfaces to the volume, and back.</summary>
+        /// <summary>Switch from surfaces to the volume, or back.</summary>
         [ContextMenu("Switch between surfaces and volume")]
         public void Switch()
         {
@@ -72,7 +72,8 @@ namespace StereoCell
             Show(hides, !hides);
         }
 
-        /// <summary>Go on loading; show the volume once it is whole. The specimen calls it each frame.</summary>
+        /// <summary>Continue loading, and show the volume when it is complete. The specimen calls this in each
+        /// frame.</summary>
         public void Advance(long mostBytes)
         {
             foreach (var box in Boxes())
@@ -85,7 +86,7 @@ namespace StereoCell
             if (surfaces != null) surfaces.SetActive(keepsSurfaces);
         }
 
-        /// <summary>Give the voxels' memory back and show the surfaces.</summary>
+        /// <summary>Free the voxels' memory and show the surfaces.</summary>
         public void Unload()
         {
             IsLoading = false;

@@ -3,7 +3,8 @@ using UnityEngine;
 
 namespace StereoCell
 {
-    /// <summary>A box that is marched: up to four channels of the specimen, whose voxels are loaded when they are shown.</summary>
+    /// <summary>Draws up to four channels of a tile as a volume, by marching rays through a box. The voxels are loaded when
+    /// they are to be shown.</summary>
     [ExecuteAlways, DisallowMultipleComponent, RequireComponent(typeof(MeshRenderer)), AddComponentMenu("")]
     public sealed class VolumeBox : MonoBehaviour
     {
@@ -31,13 +32,13 @@ namespace StereoCell
         [Tooltip("Texels: across, rows, slices")]
         public int[] size = new int[3];
 
-        [HideInInspector] public string specimenGuid;  // of the asset that the bundle was imported as
-        [HideInInspector] public string[] sources = new string[0];  // files of the bundle, a channel each
-        [HideInInspector] public int level;  // of these files
+        [HideInInspector] public string specimenGuid;  // GUID of the imported asset of the bundle
+        [HideInInspector] public string[] sources = new string[0];  // files of the bundle, one for each channel
+        [HideInInspector] public int level;  // level of detail in these files
 
         VolumeLoad load;
         VolumeTexture texture;
-        Material own;  // in play mode alone
+        Material own;  // only in play mode
         MaterialPropertyBlock block;
         bool hasFailed;
 
@@ -49,13 +50,13 @@ namespace StereoCell
             get { return texture != null; }
         }
 
-        /// <summary>Share of its voxels that are in the texture, 0 to 1.</summary>
+        /// <summary>0 to 1. The share of the box's voxels that is in the texture; 1 after a failure.</summary>
         public float Progress
         {
             get { return IsLoaded || hasFailed ? 1 : load == null ? 0 : load.Progress; }
         }
 
-        /// <summary>Go on loading. Returns whether there is nothing left to load.</summary>
+        /// <summary>Continue loading. Returns whether nothing is left to load.</summary>
         public bool Advance(long mostBytes)
         {
             if (IsLoaded && texture.IsLost) Unload();
@@ -77,7 +78,7 @@ namespace StereoCell
             return true;
         }
 
-        /// <summary>Give back the voxels' memory.</summary>
+        /// <summary>Free the voxels' memory.</summary>
         public void Unload()
         {
             if (load != null) load.Stop();
@@ -89,8 +90,9 @@ namespace StereoCell
         }
 
         /// <summary>
-        /// Take the specimen's choices over. In play mode they are in a material of the box's own, which the scriptable
-        /// pipelines batch. In the editor they are in a property block, so that no asset and no scene is changed.
+        /// Apply the specimen's colours, transfer functions and settings to this box. In play mode they go into the box's
+        /// own material, which the scriptable pipelines can batch. In the editor they go into a property block, so that no
+        /// asset and no scene is changed.
         /// </summary>
         public void Apply(Specimen specimen)
         {
@@ -110,7 +112,7 @@ namespace StereoCell
             if (Application.isPlaying)
             {
                 if (own == null) own = rendered.material;
-                rendered.SetPropertyBlock(null);  // one from the editor would be stronger, and keep it out of batches
+                rendered.SetPropertyBlock(null);  // a block from the editor would override the material and prevent batching
                 own.SetTexture(Table, specimen.Table);
                 own.SetVector(Rows, rows);
                 own.SetVector(Shown, shown);
@@ -134,9 +136,9 @@ namespace StereoCell
         }
 
         /// <summary>
-        /// The sum over the box's axes of the distance from the eye, um. In a grid of boxes a ray leaves a box only
-        /// for one that has more of it, so far boxes first is the right order, also where boxes differ in size.
-        /// (By the distance of their centres, as Unity sorts, it is not.)
+        /// Distance from the eye to the box, um, summed over the box's axes. In a grid of boxes, this sum grows from box to
+        /// box along every ray. Blending in falling order of this sum is therefore right, also for boxes of different
+        /// sizes. Unity's own order, by the distance of the boxes' centres, is not.
         /// </summary>
         public float DistanceFrom(Vector3 eye)
         {

@@ -7,9 +7,9 @@ using System.Text;
 namespace StereoCell
 {
     /// <summary>
-    /// The file of one box of voxels, read slice by slice. It starts with "SCV1" and four little-endian int32: texels
-    /// across, rows, slices, and channels (1 to 4). A DEFLATE stream follows: for each slice the plane of each channel.
-    /// Unity brings a decoder for DEFLATE on every platform, and reading takes no more memory than two slices.
+    /// Reads and writes the voxel file of one box, slice by slice. The file starts with "SCV1" and four little-endian
+    /// int32: width, rows, slices, and channels (1 to 4). A DEFLATE stream follows, which has the plane of each channel for
+    /// each slice. Unity has a decoder for DEFLATE on every platform. Reading needs memory for two slices.
     /// </summary>
     public sealed class VolumeFile : IDisposable
     {
@@ -26,7 +26,7 @@ namespace StereoCell
         readonly byte[] planes;
         int slicesRead;
 
-        /// <summary>Takes over the stream, and closes it with itself.</summary>
+        /// <summary>Open a file for reading. The stream is closed when this object is disposed.</summary>
         public VolumeFile(Stream stream)
         {
             inner = stream;
@@ -45,13 +45,13 @@ namespace StereoCell
             planes = new byte[Width * Height * Channels];
         }
 
-        /// <summary>Components of a texel: textures have 1, 2 or 4 of them.</summary>
+        /// <summary>Number of components of a texel. Textures can have 1, 2 or 4, so 3 channels take 4.</summary>
         public static int ComponentsOf(int channels)
         {
             return channels > 2 ? 4 : channels;
         }
 
-        /// <summary>Fill the next slice's texels, components side by side.</summary>
+        /// <summary>Read the next slice into an array. The components of a texel are adjacent.</summary>
         public void ReadSlice(byte[] texels)
         {
             if (ReadFully(packed, planes) < planes.Length)
@@ -67,7 +67,7 @@ namespace StereoCell
             }
         }
 
-        /// <param name="volumes">The texels of each channel: x fastest, then rows, then slices.</param>
+        /// <param name="volumes">The texels of each channel, with x fastest, then rows, then slices.</param>
         public static void Write(Stream stream, int width, int height, int depth, byte[][] volumes)
         {
             stream.Write(Encoding.ASCII.GetBytes(Magic), 0, 4);

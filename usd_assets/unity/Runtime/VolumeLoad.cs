@@ -9,8 +9,8 @@ using UnityEngine;
 namespace StereoCell
 {
     /// <summary>
-    /// The volume of one box on its way into a texture. A thread of its own reads slices, a few ahead; the main thread
-    /// uploads some each frame, so that no frame waits for the disk or for a whole volume.
+    /// Loads the volume of one box into a texture. A separate thread reads slices, a few ahead of the upload. The main
+    /// thread uploads some slices in each frame, so that no frame waits for the disk or for a whole volume.
     /// </summary>
     public sealed class VolumeLoad
     {
@@ -30,7 +30,7 @@ namespace StereoCell
 
         public VolumeTexture Texture { get; private set; }
 
-        /// <summary>Why the volume can't be shown; null while there is hope.</summary>
+        /// <summary>The reason why the volume can't be shown; null if nothing has failed.</summary>
         public string Error { get; private set; }
 
         public bool IsDone
@@ -38,13 +38,13 @@ namespace StereoCell
             get { return uploaded == box.size[2]; }
         }
 
-        /// <summary>0 to 1.</summary>
+        /// <summary>0 to 1. The share of the slices that is uploaded.</summary>
         public float Progress
         {
             get { return (float)uploaded / box.size[2]; }
         }
 
-        /// <summary>Upload the slices that have come, at most so many bytes. Call it on the main thread.</summary>
+        /// <summary>Upload slices that were read, until mostBytes are reached. Call this on the main thread.</summary>
         public void Advance(long mostBytes)
         {
             if (IsDone || Error != null) return;
@@ -59,7 +59,7 @@ namespace StereoCell
             else if (reading.IsFaulted) Fail(reading.Exception.GetBaseException().Message);
         }
 
-        /// <summary>Load it all now: outside of play mode there are no frames.</summary>
+        /// <summary>Load the whole volume now. Outside of play mode there are no frames to spread the work over.</summary>
         public void Finish()
         {
             while (!IsDone && Error == null)
@@ -69,7 +69,7 @@ namespace StereoCell
             }
         }
 
-        /// <summary>Stop reading. The texture goes with it unless it is whole.</summary>
+        /// <summary>Stop reading, and destroy the texture unless it is complete.</summary>
         public void Stop()
         {
             cancel.Cancel();

@@ -8,16 +8,17 @@ using UnityEngine.Networking;
 namespace StereoCell
 {
     /// <summary>
-    /// Where a volume's file lies, once it is there. In a player it is a streaming asset; Android keeps those inside
-    /// the application's archive, so it is copied out first. In the editor it is made of the bundle.
+    /// Finds the voxel file of a box, or makes it available. In a player the file is a streaming asset. Android keeps
+    /// streaming assets inside the application's archive, so the file is first copied out. In the editor the file is made
+    /// from the bundle.
     /// </summary>
     public sealed class VolumePlace : IDisposable
     {
         public const string Folder = "StereoCell";
         const string Unfinished = ".part";
 
-        /// <summary>Set by the editor: returns the function that makes the file of a box, on any thread, and returns
-        /// its path.</summary>
+        /// <summary>Set by the editor. For a box, it returns a function that makes the file and returns its path. That
+        /// function may run on any thread.</summary>
         public static Func<VolumeBox, Func<string>> Maker;
 
         Task<string> making;
@@ -26,10 +27,10 @@ namespace StereoCell
 
         VolumePlace() { }
 
-        /// <summary>The path; null while the file is not there.</summary>
+        /// <summary>The path of the file; null while the file is not available.</summary>
         public string Path { get; private set; }
 
-        /// <summary>Why there is no file; null while there is hope.</summary>
+        /// <summary>The reason why there is no file; null if nothing has failed.</summary>
         public string Error { get; private set; }
 
         public static VolumePlace Of(VolumeBox box)
@@ -48,7 +49,7 @@ namespace StereoCell
             return place;
         }
 
-        /// <summary>Look whether the file has come. Call it on the main thread.</summary>
+        /// <summary>Check whether the file is available now. Call this on the main thread.</summary>
         public void Advance()
         {
             if (making != null && making.IsCompleted)

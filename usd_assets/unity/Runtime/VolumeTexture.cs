@@ -7,8 +7,9 @@ using UnityEngine.Rendering;
 namespace StereoCell
 {
     /// <summary>
-    /// A 3D texture that is filled slice by slice. A render texture has no copy in main memory, so where the GPU copies
-    /// slices, no more than one slice is held twice. Elsewhere a Texture3D is filled in main memory and uploaded at once.
+    /// A 3D texture that is filled slice by slice. If the GPU can copy slices, a render texture is used. It has no copy in
+    /// main memory, so at most one slice exists twice. Otherwise a Texture3D is filled in main memory and uploaded as a
+    /// whole.
     /// </summary>
     public sealed class VolumeTexture
     {
@@ -57,7 +58,8 @@ namespace StereoCell
             get { return target != null ? (Texture)target : whole; }
         }
 
-        /// <summary>Whether the GPU has lost the texture, as it may when a phone's program comes to the front again.</summary>
+        /// <summary>Whether the GPU has lost the texture. This can happen when an application on a phone comes to the front
+        /// again.</summary>
         public bool IsLost
         {
             get { return target != null && !target.IsCreated(); }
@@ -75,7 +77,7 @@ namespace StereoCell
             Graphics.CopyTexture(slice, 0, 0, target, index, 0);
         }
 
-        /// <summary>After the last slice: give back what only loading needs.</summary>
+        /// <summary>Free the memory that only loading needs. Call this after the last slice.</summary>
         public void Finish()
         {
             if (whole != null) whole.Apply(false, true);

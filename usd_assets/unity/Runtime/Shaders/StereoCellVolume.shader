@@ -1,7 +1,7 @@
-// The box of one tile, whose volume is marched. Its back faces are drawn, so that the ray is there also when
-// the eye is inside. There is a sub-shader for the universal pipeline and one for the built-in pipeline; they differ
-// in one include. Both draw the eyes in one pass (single-pass instanced) or each by itself, as the XR plug-in asks.
-// There are no keywords of a material, so that all boxes share one variant.
+// Draws the volume in the box of one tile by ray marching. The back faces of the box are drawn, so that the volume is
+// visible also when the eye is inside. One sub-shader is for the universal pipeline and one for the built-in pipeline;
+// they differ in one include. Both can draw the two eyes in one pass (single-pass instanced) or separately, depending
+// on the XR plug-in. The material has no keywords, so all boxes share one shader variant.
 Shader "StereoCell/Volume"
 {
     Properties

@@ -1,4 +1,4 @@
-// What the volume's pass needs of the built-in render pipeline.
+// Functions of the built-in render pipeline under the names that volume_pass.hlsl uses.
 #ifndef STEREOCELL_BUILTIN
 #define STEREOCELL_BUILTIN
 
@@ -13,7 +13,7 @@ float4 clipOf(float3 object)
     return UnityObjectToClipPos(object);
 }
 
-// Distance from the eye's plane, world units.
+// Distance of a place from the eye's plane, world units.
 float depthOf(float3 object)
 {
     return -UnityObjectToViewPos(object).z;
@@ -34,7 +34,7 @@ float3 eyeInWorld()
     return _WorldSpaceCameraPos;
 }
 
-// Distance of the nearest surface from the eye's plane, world units. `screen` is screenOf of the same place.
+// Distance of the nearest surface from the eye's plane, world units. `screen` is screenOf(clip) of this pixel.
 float sceneDepthAt(float4 screen, float2 pixel)
 {
     return LinearEyeDepth(SAMPLE_DEPTH_TEXTURE_PROJ(_CameraDepthTexture, UNITY_PROJ_COORD(screen)));

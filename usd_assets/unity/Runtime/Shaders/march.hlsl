@@ -1,27 +1,30 @@
-// March the volume of one tile, up to four channels together, front to back. Functions and numbers alone:
-// the file that includes it defines float4 sampleIntensities(float3) and float4 lookUp(int, float).
-// Space of the ray: um from the box's low corner, y up, so anisotropic voxels need no care. Unity's space is
-// left-handed: x is mirrored to the specimen's, as glTFast mirrors it, and the texture coordinates with it.
-// After Engel et al., Real-Time Volume Graphics (2006): opacity correction, early termination.
-// The text keeps to what HLSL and C++ share (no out, no swizzle but xyz and rgb): the tests compile it as C++.
+// Marches a ray through the volume of one tile, front to back, with up to four channels together. This file has
+// only functions and constants. The file that includes it defines float4 sampleIntensities(float3) and
+// float4 lookUp(int, float).
+// Rays are measured in um from the box's low corner, with y up, so anisotropic voxels need no special treatment.
+// Unity's space is left-handed. Its x is mirrored relative to the specimen's, as in glTFast, and so are the texture
+// coordinates.
+// Opacity correction and early termination follow Engel et al., Real-Time Volume Graphics (2006).
+// The tests compile this file as C++, so it uses only syntax that HLSL and C++ share: no `out`, and no swizzles
+// except xyz and rgb.
 #ifndef STEREOCELL_MARCH
 #define STEREOCELL_MARCH
 
 #include "volume_material.hlsl"
 
 #define CHANNELS 4
-#define MAX_STEPS 100  // of a ray, for any size of the volume and any number of tiles
+#define MAX_STEPS 100  // limit for one ray, for any size of the volume and any number of tiles
 static const float OPAQUE = 0.99;  // opacity at which a ray ends
 
-// The room's light, the same as in StereoCell's viewer: what a white surface sends on that faces the lamp,
-// the weaker lamp, the sky and the ground.
+// Linear RGB that a white surface reflects if it faces the key lamp, the weaker fill lamp, the sky or the ground.
+// The values are the same as in StereoCell's viewer.
 static const float3 KEY_LIGHT = float3(0.66, 0.62, 0.56);
 static const float3 FILL_LIGHT = float3(0.08, 0.1, 0.14);
 static const float3 SKY_LIGHT = float3(0.33, 0.34, 0.37);
 static const float3 GROUND_LIGHT = float3(0.13, 0.125, 0.12);
 static const float GLOSS = 0.1;
 
-// Where its light comes from: unit vectors in the box's space.
+// Unit vectors in the box's space towards the key lamp, the fill lamp and the sky.
 struct Room
 {
     float3 key;
@@ -29,7 +32,7 @@ struct Room
     float3 up;
 };
 
-// Colour (not premultiplied) and opacity of a step, and each channel's share of it.
+// Colour (not premultiplied) and opacity of one step of a ray, and the share of each channel in it.
 struct Seen
 {
     float4 color;
@@ -51,7 +54,7 @@ float3 inverseOf(float3 dir)
     return float3(1.0 / awayFromZero(dir.x), 1.0 / awayFromZero(dir.y), 1.0 / awayFromZero(dir.z));
 }
 
-// Where a ray enters and leaves the box from `low` to `high` (slab test, Kay & Kajiya 1986).
+// Distances along a ray at which it enters and leaves the box from `low` to `high` (slab test, Kay & Kajiya 1986).
 float2 intersectBox(float3 eye, float3 invDir, float3 low, float3 high)
 {
     float3 a = (low - eye) * invDir;
@@ -61,13 +64,13 @@ float2 intersectBox(float3 eye, float3 invDir, float3 low, float3 high)
     return float2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
 }
 
-// The opacity of a path that is so many voxels long, of that of one voxel.
+// Opacity of a path of `voxels` voxels, from the opacity `ofVoxel` of one voxel.
 float opacityOf(float ofVoxel, float voxels)
 {
     return 1.0 - pow(1.0 - min(ofVoxel, 0.999), voxels);
 }
 
-// Channels that overlap absorb together and share the colour by their opacities.
+// Colour and opacity of one step. Overlapping channels absorb together; the colour is their mean, weighted by opacity.
 Seen classify(float4 intensity, float voxels)
 {
     Seen seen;
@@ -92,8 +95,8 @@ Seen classify(float4 intensity, float voxels)
     return seen;
 }
 
-// Gradient of the intensities, each channel by its share: differences over two voxels of the means of the
-// cube's corners, in the box's directions.
+// Gradient of the intensities in the box's directions, with each channel weighted by its share. The eight samples are
+// the corners of a cube two voxels wide. Each component is half the difference between the means of two opposite faces.
 float3 gradientAt(float3 p, float3 texPerUm, float4 shares)
 {
     float3 h = _Voxel * abs(texPerUm);
@@ -107,15 +110,16 @@ float3 gradientAt(float3 p, float3 texPerUm, float4 shares)
     return 0.25 * gradient * sign(texPerUm);
 }
 
-// Which face of the box round all tiles a place lies on, along an axis: -1, 1, or 0 for neither.
+// The face of the box around all tiles on which a place lies, along one axis: -1 for the low face, 1 for the high
+// face, 0 for neither.
 float faceAt(float place, float low, float high)
 {
     float near = 0.05 * _Voxel;
     return (abs(place - high) < near ? 1.0 : 0.0) - (abs(place - low) < near ? 1.0 : 0.0);
 }
 
-// Unit normal of the face by which a ray comes in; 0: it begins within. What is cut through is lit as the face:
-// along it the gradient of the matter has no side that faces the eye.
+// Unit normal of the outer face through which a ray enters; 0 if the ray does not start on an outer face. Tissue that
+// this face cuts is lit with the face's normal, because the gradient inside the tissue does not face the eye.
 float3 cutFace(float3 start)
 {
     float3 face = float3(
@@ -132,14 +136,14 @@ float3 lightOn(float3 normal, Room room)
     return around + KEY_LIGHT * max(dot(normal, room.key), 0.0);
 }
 
-// Steps of intensity over two voxels: below the first they are noise, above the second a boundary; between,
-// light fades in. What has no boundary is lit through by its surroundings.
+// Intensity differences over two voxels. Below the first value they are noise, and above the second they are a
+// boundary; shading fades in between. Voxels without a boundary get the scattered light of their surroundings.
 static const float NOISE_STEP = 0.03;
 static const float BOUNDARY_STEP = 0.18;
 static const float FLAT_STEP = 1e-4;
 static const float SCATTERED = 1.2;
 
-// Diffuse light by the gradient (Levoy 1988), and the lamp's own gloss (Blinn 1977, exponent 16).
+// Diffuse light by the gradient (Levoy 1988), and a highlight of the key lamp (Blinn 1977, exponent 16).
 float3 shade(float3 color, float3 gradient, float3 dir, Room room)
 {
     float steepness = length(gradient);
@@ -156,15 +160,15 @@ float3 shade(float3 color, float3 gradient, float3 dir, Room room)
     return lerp(unlit, facing, smoothstep(NOISE_STEP, BOUNDARY_STEP, steepness));
 }
 
-// The steps of a ray through this tile, of which all tiles together have _Steps.
+// Number of steps that a ray may take in this tile. All tiles on the ray share _Steps by the ray's length in each.
 int stepsOf(float span, float whole)
 {
     float share = min(1.0, span / max(whole, 1e-6));
     return clamp((int)(share * (_Steps - _Spare) + 1e-3), 1, MAX_STEPS);
 }
 
-// Linear light, premultiplied. `dir` has unit length, so that distances along the ray are um; what is
-// beyond `scene` is hidden; `shift` 0..1 says where in its step a sample lies.
+// Returns linear RGBA, premultiplied. `dir` has unit length, so distances along the ray are um. Voxels beyond the
+// distance `scene` are hidden. `shift` is the position of the sample within its step, 0..1.
 float4 march(float3 eye, float3 dir, float scene, float shift, Room room)
 {
     float3 invDir = inverseOf(dir);
@@ -172,7 +176,8 @@ float4 march(float3 eye, float3 dir, float scene, float shift, Room room)
     span.x = max(span.x, 0.0);
     float2 whole = intersectBox(eye, invDir, _AllLow.xyz, _AllHigh.xyz);
     int steps = stepsOf(span.y - span.x, whole.y - max(whole.x, 0.0));
-    // From here on t counts from where the ray comes in: far from the eye, floats would be too coarse.
+    // From here on, t is the distance from the entry into the box. The distance from a far eye would be too coarse for
+    // 32-bit floats.
     float end = min(span.y, scene) - span.x;
     float3 texPerUm = (_TexHigh.xyz - _TexLow.xyz) / _Size.xyz;
     float3 start = eye + span.x * dir;
@@ -186,7 +191,7 @@ float4 march(float3 eye, float3 dir, float scene, float shift, Room room)
     for (int i = 0; i < MAX_STEPS; i++)
     {
         if (i >= steps || t >= end || sum.a >= OPAQUE) break;
-        // What remains of the ray over what remains of the budget: it always reaches the end.
+        // The rest of the ray is divided by the rest of the steps, so the ray always reaches its end.
         float dt = min(max(_MinStep, (end - t) / (float)(steps - i)), end - t);
         float3 p = texStart + (t + shift * dt) * texDir;
         Seen seen = classify(sampleIntensities(p), dt / _Voxel);
@@ -205,11 +210,11 @@ float4 march(float3 eye, float3 dir, float scene, float shift, Room room)
         }
         t += dt;
     }
-    // A ray that ended early is opaque: what was left out behind looks as what is in front.
+    // A ray that ended early is treated as fully opaque, with the colour of the part in front.
     return sum.a >= OPAQUE ? sum / sum.a : sum;
 }
 
-// An offset for each pixel, which turns bands into fine grain (interleaved gradient noise, Jimenez 2014).
+// Offset of a pixel's samples, 0..1, which turns bands into fine grain (interleaved gradient noise, Jimenez 2014).
 float grain(float2 pixel)
 {
     return frac(52.9829189 * frac(0.06711056 * pixel.x + 0.00583715 * pixel.y));

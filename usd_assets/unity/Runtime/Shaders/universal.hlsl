@@ -1,4 +1,4 @@
-// What the volume's pass needs of the universal render pipeline.
+// Functions of the universal render pipeline under the names that volume_pass.hlsl uses.
 #ifndef STEREOCELL_UNIVERSAL
 #define STEREOCELL_UNIVERSAL
 
@@ -20,7 +20,7 @@ float4 clipOf(float3 object)
     return TransformObjectToHClip(object);
 }
 
-// Distance from the eye's plane, world units.
+// Distance of a place from the eye's plane, world units.
 float depthOf(float3 object)
 {
     return -TransformWorldToView(TransformObjectToWorld(object)).z;
@@ -49,7 +49,7 @@ float sceneDepthAt(float4 screen, float2 pixel)
 
 float4 screenOf(float4 clip)
 {
-    return clip;  // the fragment's own position serves here
+    return clip;  // not used: sceneDepthAt takes the pixel's position instead
 }
 
 float3 gammaOf(float3 light)

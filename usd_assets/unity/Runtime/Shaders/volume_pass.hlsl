@@ -1,4 +1,4 @@
-// The pass that marches a tile's box, for either render pipeline: builtin.hlsl or universal.hlsl comes before it.
+// The pass that draws the volume in a tile's box. The shader includes builtin.hlsl or universal.hlsl before this file.
 #ifndef STEREOCELL_VOLUME_PASS
 #define STEREOCELL_VOLUME_PASS
 
@@ -43,7 +43,7 @@ float3 directionInBox(float3 world)
     return normalize(toBox(float4(objectDirectionOf(world), 0.0)));
 }
 
-// Towards a lamp of the room that hangs in the eye's axes: right, up, back.
+// Unit vector in the box's space towards a lamp that moves with the eye. `inEye` has the eye's axes: right, up, back.
 float3 lampInBox(float3 inEye)
 {
     return directionInBox(mul(inEye, (float3x3)UNITY_MATRIX_V));

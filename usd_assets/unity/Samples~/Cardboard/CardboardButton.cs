@@ -7,15 +7,15 @@ using Google.XR.Cardboard;
 namespace StereoCell.Samples
 {
     /// <summary>
-    /// The viewer's one button switches the tile that is looked at, without waiting for the dwell. Without the Cardboard
-    /// XR plug-in, a click of the mouse or a tap does.
+    /// The button of the Cardboard viewer switches the tile that is looked at, without waiting for the dwell. Without the
+    /// Cardboard XR plug-in, a mouse click or a tap does the same.
     /// </summary>
     [RequireComponent(typeof(GazeSwitch)), AddComponentMenu("StereoCell/Cardboard Button")]
     public sealed class CardboardButton : MonoBehaviour
     {
         void Start()
         {
-            Screen.sleepTimeout = SleepTimeout.NeverSleep;  // nobody touches the screen
+            Screen.sleepTimeout = SleepTimeout.NeverSleep;  // the screen is not touched during use
 #if STEREOCELL_CARDBOARD && !UNITY_EDITOR
             if (!Api.HasDeviceParams()) Api.ScanDeviceParams();
 #endif

@@ -4,7 +4,8 @@ using UnityEngine.XR;
 
 namespace StereoCell.Samples
 {
-    /// <summary>Turns and moves the camera with the head, for any XR plug-in, without a package for input.</summary>
+    /// <summary>Turns and moves the camera with the head. It works with any XR plug-in and needs no package for
+    /// input.</summary>
     [AddComponentMenu("StereoCell/Head Pose")]
     public sealed class HeadPose : MonoBehaviour
     {

@@ -3,8 +3,8 @@ using UnityEngine;
 
 namespace StereoCell.Samples
 {
-    /// <summary>A dot in the middle of the view, and a ring around it that fills while a tile is looked at, and again
-    /// while its voxels are loaded.</summary>
+    /// <summary>A dot in the middle of the view with a ring around it. The ring fills while a tile is looked at, and again
+    /// while the tile's voxels are loaded.</summary>
     [RequireComponent(typeof(MeshFilter), typeof(MeshRenderer)), AddComponentMenu("StereoCell/Reticle")]
     public sealed class Reticle : MonoBehaviour
     {
@@ -18,7 +18,7 @@ namespace StereoCell.Samples
         int[] triangles;
         int shown = -1;
 
-        /// <summary>Segments of the ring that are filled.</summary>
+        /// <summary>Number of the ring's segments that are filled.</summary>
         public int Filled
         {
             get { return shown; }
@@ -59,7 +59,7 @@ namespace StereoCell.Samples
                 vertices[3 * i + 1] = direction * Inner;
                 vertices[3 * i + 2] = direction * Outer;
             }
-            // the dot's triangles first, so that a part of the list is the dot and a part of the ring
+            // The dot's triangles come first, so that the first n triangles are the dot and the filled part of the ring.
             for (var i = 0; i < Segments; i++)
             {
                 int dot = 3 * i, ring = 3 * Segments + 6 * i, here = 3 * i, next = 3 * (i + 1);

@@ -1,4 +1,4 @@
-// The reticle lies over everything, in both eyes. A pass without a LightMode is drawn by either render pipeline.
+// Draws the reticle in front of everything, in both eyes. Both render pipelines draw a pass that has no LightMode.
 Shader "StereoCell/Reticle"
 {
     Properties

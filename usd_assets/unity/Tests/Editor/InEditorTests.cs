@@ -10,8 +10,9 @@ using Object = UnityEngine.Object;
 namespace StereoCell.Tests
 {
     /// <summary>
-    /// These tests need the editor: its compilers take the shader, and surfaces that glTFast imports lie where the volumes
-    /// are. For the second one, the environment's STEREOCELL_BUNDLE names a bundle's folder.
+    /// Tests that need the editor. The first checks that the editor's compilers accept the shader. The second checks that
+    /// surfaces from glTFast lie inside the volumes; it needs the environment variable STEREOCELL_BUNDLE, a bundle's
+    /// folder.
     /// </summary>
     public sealed class InEditorTests
     {

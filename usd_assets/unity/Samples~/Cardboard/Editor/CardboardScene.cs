@@ -7,8 +7,8 @@ using UnityEngine;
 namespace StereoCell.Samples.Editor
 {
     /// <summary>
-    /// Makes the scene of this sample around the selected specimens. It is made and not a file of the sample, because it
-    /// holds your specimen, whose numbers in a scene's file only the editor knows.
+    /// Makes the scene of this sample around the selected specimens. The sample has no scene file, because a scene file
+    /// would refer to your specimen by identifiers that only your editor knows.
     /// </summary>
     public static class CardboardScene
     {
@@ -37,7 +37,7 @@ namespace StereoCell.Samples.Editor
             return Selection.objects.OfType<GameObject>().Where(each => each.GetComponent<Specimen>() != null).ToArray();
         }
 
-        /// <summary>Returns the reticle.</summary>
+        /// <summary>Add a light, a player with a camera, the specimens and a reticle. Returns the reticle.</summary>
         public static Reticle Build(GameObject[] specimens)
         {
             var light = new GameObject("Light").AddComponent<Light>();
@@ -65,7 +65,7 @@ namespace StereoCell.Samples.Editor
             return reticle;
         }
 
-        /// <summary>Specimens stand side by side, a metre apart.</summary>
+        /// <summary>Add a specimen to the scene. Specimens stand side by side, one metre apart.</summary>
         static GazeSwitch Place(GameObject specimen, int index, int count, Camera camera)
         {
             var placed = (GameObject)PrefabUtility.InstantiatePrefab(specimen);

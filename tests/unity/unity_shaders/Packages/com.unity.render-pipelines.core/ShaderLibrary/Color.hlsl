@@ -1,4 +1,4 @@
-// Colour, by the core library's names.
+// Stub of the core library's functions for colours.
 float3 LinearToSRGB(float3 c)
 {
     float3 low = c * 12.92;

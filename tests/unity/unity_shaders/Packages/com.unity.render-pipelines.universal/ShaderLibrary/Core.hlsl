@@ -1,5 +1,5 @@
-// The names that the package's shader takes of the universal pipeline's own includes, to compile it without Unity.
-// The matrices are the mono ones; with UNITY_STEREO_INSTANCING_ENABLED those of an eye, by instance.
+// Stub of the names from the universal pipeline's includes that the package's shader uses, to compile it without Unity.
+// The matrices are those of one camera. With UNITY_STEREO_INSTANCING_ENABLED, they are those of the instance's eye.
 #ifndef UNIVERSAL_CORE
 #define UNIVERSAL_CORE
 

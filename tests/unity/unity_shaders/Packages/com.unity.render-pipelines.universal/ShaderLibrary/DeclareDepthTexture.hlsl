@@ -1,4 +1,4 @@
-// The scene's depth, by the universal pipeline's names.
+// Stub of the universal pipeline's functions for the scene's depth.
 TEXTURE2D_X(_CameraDepthTexture);
 SAMPLER(sampler_PointClamp);
 
