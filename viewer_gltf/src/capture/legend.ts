@@ -19,7 +19,8 @@ export function legendOf(
     const dot = [toHex(color)];
     if (found.objects !== undefined) {
       const legend = colorsOf(id);
-      if (legend === null) return [{ name, colors: dot, text: "" }]; // the values of a label map are names of objects, so that a window has no meaning
+      // The values of a label map are names of objects, so that a window has no meaning.
+      if (legend === null) return [{ name, colors: dot, text: "" }];
       const rows = legend.rows.map((row) => ({ name: "", ...row }));
       return [{ name, colors: [], text: `by ${legend.column}` }, ...rows];
     }
