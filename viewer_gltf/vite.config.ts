@@ -43,7 +43,7 @@ const UNUSED = new Set([
 const NEVER =
   /^"#if(def)? (USE_(IRIDESCENCE|ALPHAHASH|BATCHING|BUMPMAP|ENVMAP|FOG|SKINNING|(INSTANCING_)?MORPH\w*)|NUM_(CLIPPING_PLANES|LIGHT_PROBE_GRIDS) > 0)\\n/;
 
-/** Returns whether a part (source of a string) is only for an unused feature: its first `#if` ends at the last `#endif`. */
+/** Returns whether a part, given as a string's source, is only for an unused feature: its first `#endif` is its end. */
 function isNeverUsed(source: string): boolean {
   const end = '\\n#endif"';
   return NEVER.test(source) && source.indexOf(end.slice(0, -1)) === source.length - end.length;

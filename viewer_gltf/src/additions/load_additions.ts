@@ -1,4 +1,4 @@
-/** Loads the additions, which a layer of the stage adds to the specimen. This code loads only for bundles that have any. */
+/** Loads additions, which a layer of the stage adds to the specimen. This code loads only for bundles with additions. */
 import { type Material, Mesh, type Object3D } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { BundleError } from "../bundle/errors";

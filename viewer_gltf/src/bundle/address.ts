@@ -59,7 +59,7 @@ export function namesBundle(page: string): boolean {
 
 /**
  * Returns the folder of the bundle, with a closing slash. `?bundle=` names the folder or its manifest.json, relative to
- * the page or absolute; without it the bundle is beside the page. A document that contains its bundle opens no other.
+ * the page or absolute. Without it the bundle is beside the page. A document that contains its bundle opens no other.
  * Throws BundleError if it names no address of the web.
  */
 export function bundleAddress(page: string): string {

@@ -28,7 +28,7 @@ function unzstd(frame: Uint8Array, bytes: number, part: number): Uint8Array {
 async function decode({ parts, bytes }: DecodeRequest): Promise<Uint8Array<ArrayBuffer>> {
   await ready;
   const decoded = parts.map((part, i) => unzstd(part, bytes, i));
-  if (decoded.length === 1) return decoded[0] as Uint8Array<ArrayBuffer>; // already a copy, which can be transferred to the page
+  if (decoded.length === 1) return decoded[0] as Uint8Array<ArrayBuffer>; // already a copy, which can be transferred
   // Three channels take four bytes, since textures of three bytes are slow on some devices.
   const stride = decoded.length === 2 ? 2 : 4;
   const packed = new Uint8Array(bytes * stride);

@@ -1,4 +1,4 @@
-/** Loads the small files of a bundle: the manifest, and a channel's list of volumes, 2D transfer functions and histogram. */
+/** Loads the small files of a bundle: the manifest, and a channel's list of volumes, 2D functions and histogram. */
 
 import { bricksAddress } from "./brick_host";
 import { fetchFile, fileAddress, parseJson, readBody, request } from "./fetch";

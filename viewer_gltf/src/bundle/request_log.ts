@@ -1,4 +1,4 @@
-/** Logs the requests to the bundle's host, so that a service worker can keep files that were loaded before it started. */
+/** Logs the requests to the bundle's host, for a service worker that keeps files which were loaded before it started. */
 
 /** A request; `range` is its Range header. */
 export type Asked = Readonly<{ url: string; range: string | null }>;

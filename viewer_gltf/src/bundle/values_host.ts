@@ -19,7 +19,7 @@ export class ValuesHost {
   /** @param address as `valuesAddress` returns it */
   constructor(private readonly address: string) {}
 
-  /** Returns the value of a voxel, given by its centre in the volume's own um, if it has been fetched; otherwise null. */
+  /** Returns the value of a voxel, given by its centre in the volume's own um; null if it was not fetched. */
   known(tile: string, channel: string, voxel_um: Vec3): number | null {
     return this.values.get(keyOf(tile, channel, voxel_um)) ?? null;
   }

@@ -107,7 +107,7 @@ export function savePicture(
   const { renderer, studio, navigation } = scene;
   const { camera } = navigation;
   const { width, height } = renderer.domElement;
-  const isTwo = scene.state.screenStereo === "side-by-side"; // the halves for both eyes can't be divided into parts of one image
+  const isTwo = scene.state.screenStereo === "side-by-side"; // its halves can't be drawn in parts
   const most = isTwo ? 1 : Math.floor(Math.sqrt(MAX_PIXELS / (width * height)));
   const scale = Math.max(1, Math.min(wanted, most));
   const eye = isTwo ? width / 2 : width; // width of the camera's view

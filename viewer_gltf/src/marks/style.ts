@@ -143,7 +143,7 @@ export function rimmed(mark: MarkMesh): MarkMesh {
   return mark;
 }
 
-/** Disposes of geometry and materials of all meshes and lines below an object; disposing of shared ones twice is safe. */
+/** Disposes of geometry and materials of all meshes and lines below an object; shared ones may be disposed of twice. */
 export function disposeMarks(root: Object3D): void {
   root.traverse((object) => {
     const { geometry, material } = object as Partial<MarkMesh>;

@@ -39,9 +39,9 @@ export class KeepOffline {
   }
 
   /**
-   * Starts after the first frame. From then on the page's root element has `data-offline`: "partly" once everything that
-   * was shown and can be kept is kept, "ready" once every tile is kept, "refused" if the browser keeps nothing, for
-   * example on a full disk.
+   * Starts after the first frame. From then on the page's root element has `data-offline`. It is "partly" once everything
+   * that was shown and can be kept is kept, and "ready" once every tile is kept. It is "refused" if the browser keeps
+   * nothing, for example on a full disk.
    */
   static async start(host: PartHost): Promise<void> {
     const keeping = await Keeping.start();

@@ -87,7 +87,7 @@ describe("the keeper", () => {
     expect(await areKept()).toEqual([false, true, true, true]);
     await keeper.adopt(PAGE, [{ url, range: null }]);
     expect(await areKept()).toEqual([true, true, true, true]);
-    expect(await keeper.areKept(PAGE, [{ url, range: "bytes=0-1" }])).toEqual([true]); // a part of the whole file, which is kept
+    expect(await keeper.areKept(PAGE, [{ url, range: "bytes=0-1" }])).toEqual([true]); // a part of a kept file
   });
 
   it("answers with the kept file, even if the host has changed it", async () => {

@@ -213,7 +213,7 @@ export class Keeper {
     await this.store.put(this.keys.file(base, ref.sha256, range), { body, type, range: found });
   }
 
-  /** Returns a bundle's files. After a restart of the worker they come from the kept manifest; null is not remembered. */
+  /** Returns a bundle's files; after a restart of the worker, from the kept manifest. The result null is not stored. */
   private async listedOf(base: string): Promise<Listed | null> {
     let listed = this.listed.get(base);
     if (listed === undefined) {

@@ -1,6 +1,6 @@
 /**
- * Makes the tables by which the path tracer samples directions of an environment's light: radiance and probability
- * density of each direction, and a table of aliases (Walker 1977; built by the method of Vose 1991). Pure arrays.
+ * Makes the tables by which the path tracer samples directions of an environment's light. They contain radiance and
+ * probability density of each direction, and aliases (Walker 1977; built by the method of Vose 1991). Pure arrays.
  */
 
 /** An environment map: rows of `width` RGB texels of linear radiance, top row first. */

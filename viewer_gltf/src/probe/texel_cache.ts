@@ -45,7 +45,10 @@ export class TexelCache {
     return this.decoded(this.reopen(source.volume), order[order.length - 1]);
   }
 
-  /** Returns the finest level of at most `most` texels, or the coarsest, fetched if needed. Throws BundleError, AbortError. */
+  /**
+   * Returns the finest level of at most `most` texels, or the coarsest; fetches it if needed. Throws BundleError,
+   * AbortError.
+   */
   within(source: LevelSource, most: number): Promise<VolumeLevel> {
     const { levels } = source.volume;
     const found = levels.findIndex((level) => texels(level) <= most);
@@ -57,7 +60,7 @@ export class TexelCache {
     const { file, levels } = source.volume;
     const key = `${file.path} ${file.sha256} ${index}`;
     const before = this.kept.get(key);
-    this.kept.delete(key); // it is added again at the end, which makes it the most recently used
+    this.kept.delete(key); // adding the level again at the end makes it the most recently used
     const bytes = texels(levels[index]);
     const level = before?.level ?? this.decode(source, index, bytes);
     this.kept.set(key, { bytes, level });

@@ -11,7 +11,7 @@ export function isOwnAddress(): boolean {
   return location.href === own;
 }
 
-/** Returns whether the split screen made the present step of the history; leaving it removes the step and its address. */
+/** Returns whether the split screen made the present step of the history; leaving the split screen removes this step. */
 export function isPassingStep(): boolean {
   return (history.state as { split?: number } | null)?.split !== undefined;
 }

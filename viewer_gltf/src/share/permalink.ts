@@ -237,7 +237,7 @@ class LinkReader {
     const text = this.parts.get("c");
     if (text === undefined) return;
     const named = text === "" ? [] : text.split(",").flatMap((id) => this.channel(id) ?? []);
-    if (text !== "" && named.length === 0) return; // the bundle has none of these channels: keep those that it opens with
+    if (text !== "" && named.length === 0) return; // keeps the channels with which the bundle opens
     const wanted = new Set(named.slice(0, MAX_CHANNELS).map(({ id }) => id));
     const show = (shown: boolean) => {
       for (const each of this.state.channels) {

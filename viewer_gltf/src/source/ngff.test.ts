@@ -32,7 +32,7 @@ describe("the metadata of OME-Zarr", () => {
     expect(levels[0].shift_um).toEqual([5, 10, 15]);
   });
 
-  it("of older versions have only names of axes, and a spacing is assumed", () => {
+  it("have only names of axes in older versions, and a spacing is assumed", () => {
     const old = {
       multiscales: [{ version: "0.3", axes: ["t", "c", "z", "y", "x"], datasets: [{ path: "0" }] }],
     };

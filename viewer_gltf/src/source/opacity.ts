@@ -120,7 +120,7 @@ function noiseBeyond(below: Float64Array): number {
   return (Math.log(below[last] / (FAINT * peak)) * (last - before)) / fall;
 }
 
-/** Smooths counts by a Gaussian of 2 bins and repeats the end bins, like SciPy's `gaussian_filter1d` in mode `nearest`. */
+/** Smooths counts by a Gaussian of 2 bins, like SciPy's `gaussian_filter1d` in mode `nearest`. */
 function smoothed(counts: Float64Array): Float64Array {
   const [sigma, reach] = [2, 8];
   const weights = Array.from({ length: 2 * reach + 1 }, (_, i) =>

@@ -43,7 +43,7 @@ export type LocalSource =
   | Readonly<{ kind: "file"; file: File }>
   | Readonly<{ kind: "folder"; name: string; find: (path: string) => Promise<File | null> }>;
 
-/** Opens a file or a folder of this machine. None of its data leaves the machine. Throws SourceError. */
+/** Opens a file or a folder of this machine. Its data never leave the machine. Throws SourceError. */
 export async function openLocal(source: LocalSource, report: Report): Promise<ShownSource> {
   if (source.kind === "file")
     return shown(await openFile(new LocalFile(source.file), report), report);

@@ -1,5 +1,5 @@
 /**
- * Reads files of a source from a host. A page may read another host's files only if that host allows it, so each error
+ * Reads files of a source from a host. A page may read another host's files only if that host allows it. Each error
  * names the person who can solve it: the user, or the operator of the host.
  *
  * Requests carry no cookie and no Referer. Parts are requested by their first and last byte, which needs no CORS

@@ -4,7 +4,7 @@ import { ZSTDDecoder } from "zstddec";
 import { storeZstd, writeKtx2 } from "./texture_file";
 
 describe("a texture", () => {
-  it.each([1, 2, 4] as const)("of %i components is readable by ktx-parse", async (channels) => {
+  it.each([1, 2, 4] as const)("is readable by ktx-parse with %i components", async (channels) => {
     const zstd = new ZSTDDecoder();
     await zstd.init();
     const sizes =

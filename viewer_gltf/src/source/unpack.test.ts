@@ -57,7 +57,7 @@ describe.skipIf(!hasPython)("a packed chunk", () => {
 });
 
 describe("a stream", () => {
-  it("of LZ4 may repeat bytes that it has just written", () => {
+  it("may repeat bytes that it has just written, in LZ4", () => {
     // one literal, then 11 bytes copied from 1 byte back, then the last literals
     expect(String.fromCharCode(...unpackLz4(Uint8Array.of(0x17, 97, 1, 0, 0x10, 98), 13))).toBe(
       "aaaaaaaaaaaab",

@@ -13,7 +13,7 @@ import { partsOf } from "./zip_store";
 const HEADER_BYTES = 16;
 /** Flags of the header. */
 const [SHUFFLED, COPIED, BIT_SHUFFLED, UNSPLIT] = [1, 2, 4, 16];
-/** A block has a stream for each byte of a value if values have at most so many bytes, and a block has so many values. */
+/** Blocks have a stream for each byte of a value if values have at most 16 bytes, and blocks at least 128 values. */
 const [MAX_SPLITS, MIN_SPLIT] = [16, 128];
 /** Largest chunk that is unpacked. */
 const MAX_BYTES = 1 << 30;

@@ -71,7 +71,7 @@ describeInChromium("the objects of a label map", () => {
     ]) {
       expect(hasColor(COLORS[row % 3])(at(picture, centerOf(row))), `row ${row}`).toBe(true);
     }
-    expect(hasColor(COLORS[BEAM % 3])(at(picture, [57, -42.5, 16]))).toBe(true); // the beam has the same colour in both tiles
+    expect(hasColor(COLORS[BEAM % 3])(at(picture, [57, -42.5, 16]))).toBe(true); // in both tiles
     expect(hasColor(COLORS[BEAM % 3])(at(picture, [63, -42.5, 16]))).toBe(true);
     expect(await shown()).toContain(`${COUNT} of ${COUNT} objects`);
     expect((await stand.viewer.snapshot()).drawCalls).toBeLessThan(20);

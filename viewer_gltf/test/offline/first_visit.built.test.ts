@@ -86,7 +86,7 @@ describeInChromium("a first visit", () => {
     expect(host.requests.length).toBe(asked);
     expect(before.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     expect(difference(before, after)).toBeLessThan(SAME);
-    expect(await said()).toEqual([]); // it was announced before
+    expect(await said()).toEqual([]); // the first visit has announced it
     expect(await missing(page)).toEqual([]);
   });
 });

@@ -320,7 +320,7 @@ describeInChromium("the path-traced page", () => {
       stand.host.overrides.set(STUDIO, { status: 503, body: "" });
       await open();
       await expect.poll(notices, PATIENT).toHaveLength(1);
-      await press("2", "1", "2"); // what changes the state does not ask again
+      await press("2", "1", "2"); // other changes of the state do not request it again
       await stand.viewer.settled();
       expect(await notices()).toHaveLength(1);
       stand.host.overrides.delete(STUDIO);
@@ -336,7 +336,7 @@ describeInChromium("the path-traced page", () => {
     await expect
       .poll(notices, PATIENT)
       .toEqual([expect.stringContaining("path tracing could not be loaded")]);
-    await press("2", "1", "2"); // what changes the state does not ask again
+    await press("2", "1", "2"); // other changes of the state do not request the code again
     await stand.viewer.settled();
     expect(await notices()).toHaveLength(1);
     await page().unroute(/\/path_tracer-[^/]*\.js$/);

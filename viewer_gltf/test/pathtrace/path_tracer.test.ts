@@ -146,7 +146,7 @@ describeInChromium("the path tracer", () => {
     for (const [name, told] of sweep(TOLD, ([, told]) => !("isTwoD" in told))) {
       it(`given ${name}`, async () => {
         const { channels = 1 }: Partial<Run> = told;
-        const opacity = 20; // of one channel, as an 8-bit number; equal channels share it
+        const opacity = 20; // opacity of one channel, 8 bits; equal channels share it
         const share = Math.round(255 * (1 - (1 - opacity / 255) ** (1 / channels)));
         const opacities = new Array<number>(256).fill(opacity);
         const texels = slab(AXIS.map(() => 255));
