@@ -59,7 +59,7 @@ window.draw = async (address, view, lights, [width, height]) => {
   const scene = new THREE.Scene();
   scene.environment = image;
   scene.environmentIntensity = lights.dome;
-  scene.environmentRotation.y = -Math.PI / 2; // USD and three.js begin an environment image in different directions
+  scene.environmentRotation.y = -Math.PI / 2; // USD and three begin an image of all directions elsewhere
   scene.add(isGltf ? loaded.scene : loaded);
   for (const { color, intensity, towards } of lights.suns) {
     const light = new THREE.DirectionalLight(new THREE.Color(...color), intensity);
