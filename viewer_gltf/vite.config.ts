@@ -9,7 +9,7 @@ import { stripUnused } from "./scripts/strip_unused.ts";
 const SERVICE_WORKER = "sw.js";
 const PAGE = fileURLToPath(new URL("index.html", import.meta.url));
 
-/** Shaders travel without their comments: the reader has the sources. */
+/** Removes the comments of shaders from the build; they remain in the sources. */
 function stripShaders(): Plugin {
   return {
     name: "strip-shaders",
@@ -25,7 +25,7 @@ function stripShaders(): Plugin {
   };
 }
 
-/** Materials of three that the page has none of. */
+/** Materials of three.js that the page does not use. */
 const UNUSED = new Set([
   ...[
     "background",
@@ -39,17 +39,17 @@ const UNUSED = new Set([
   ],
   ...["meshlambert", "meshmatcap", "meshnormal", "meshphong", "meshtoon"],
 ]);
-/** Features of three that none of the page's materials, lights and surfaces has: parts for one alone don't travel. */
+/** Features of three.js that the page never uses; the build leaves out parts of shaders that only they need. */
 const NEVER =
   /^"#if(def)? (USE_(IRIDESCENCE|ALPHAHASH|BATCHING|BUMPMAP|ENVMAP|FOG|SKINNING|(INSTANCING_)?MORPH\w*)|NUM_(CLIPPING_PLANES|LIGHT_PROBE_GRIDS) > 0)\\n/;
 
-/** Whether a part, as a string's source, is for such a feature alone: what begins first ends last. */
+/** Returns whether a part, given as a string's source, is only for an unused feature: its first `#endif` is its end. */
 function isNeverUsed(source: string): boolean {
   const end = '\\n#endif"';
   return NEVER.test(source) && source.indexOf(end.slice(0, -1)) === source.length - end.length;
 }
 
-/** Parts of the others for what none of the page's materials does, and parts of the unused ones alone. */
+/** Parts of shaders that only unused materials need, or that the page's materials never use. */
 const UNUSED_PARTS = [
   "lights_lambert_fragment",
   "lights_lambert_pars_fragment",
@@ -69,12 +69,12 @@ const UNUSED_PARTS = [
   "map_particle_pars_fragment",
 ];
 
-/** Spaces within round brackets, too; tabs within a line part words. */
+/** Indents, and spaces next to round brackets. Tabs within a line separate words and stay. */
 const INDENTS = /(?<=\\n(?:\\t)*)\\t|(?<=\() | (?=\))/g;
 
 /**
- * Their shaders don't travel: three lists them all, so that no bundler sees that nobody asks for them. Those of the
- * others travel without indents.
+ * Removes the shaders of unused materials. A bundler can't do this, because three.js lists all shaders in one object.
+ * The other shaders lose their indents.
  */
 function stripMaterials(): Plugin {
   return {
@@ -95,7 +95,7 @@ function stripMaterials(): Plugin {
   };
 }
 
-/** Schemas travel without their descriptions and titles, which no check reads. */
+/** Removes descriptions and titles from schemas, since no check reads them. */
 function stripSchemas(): Plugin {
   return {
     name: "strip-schemas",
@@ -112,8 +112,8 @@ function stripSchemas(): Plugin {
 }
 
 /**
- * Codecs of sources in place of those of numcodecs, whose WebAssembly has the compressors as well (1.4 MB), and makes
- * functions of text, which the page's policy forbids.
+ * Codecs of sources that replace those of numcodecs. The WebAssembly of numcodecs includes the compressors (1.4 MB), and
+ * its glue code makes functions from text, which the page's policy forbids.
  */
 const CODECS = Object.fromEntries(
   ["blosc", "lz4", "zstd"].map((name) => [
@@ -124,7 +124,7 @@ const CODECS = Object.fromEntries(
 
 const BUILT = "test/**/*.built.test.ts";
 
-/** Tests that open pages. */
+/** Returns a project of tests that open pages in a browser. */
 function ofBrowser(name: string, files: { include: string[]; exclude?: string[] }) {
   return {
     extends: true as const,
@@ -135,12 +135,12 @@ function ofBrowser(name: string, files: { include: string[]; exclude?: string[] 
       globalSetup: "test/support/browser/shared_fixture.ts",
       testTimeout: 180_000,
       hookTimeout: 180_000,
-      expect: { poll: { timeout: 90_000 } }, // its usual second is short for a busy machine
-      // software draws: two pages at a time, one of each project, are enough for two cores
+      expect: { poll: { timeout: 90_000 } }, // the default, one second, is too short for a busy machine
+      // Pages are drawn in software. Two pages at a time, one of each project, are enough for two cores.
       fileParallelism: false,
       isolate: false,
-      sequence: { groupOrder: 1 }, // not beside the unit tests
-      // where others have the cores a browser may miss a moment; what is wrong is wrong each time
+      sequence: { groupOrder: 1 }, // not at the same time as the unit tests
+      // On a busy machine a browser may miss a moment, so tests are repeated there. A real fault fails each time.
       retry: process.env.CI === undefined ? 0 : 2,
     },
   };
@@ -160,7 +160,7 @@ export default defineConfig({
         codeSplitting: {
           groups: [
             { name: oneChunk(PAGE, "index"), priority: 1 },
-            { name: "objects", test: /\/src\/objects\// }, // what their section shares with them, too
+            { name: "objects", test: /\/src\/objects\// }, // includes code that their section shares with them
             { name: "source_codecs", test: /\/src\/source\/(codecs\/|unpack)|\/zstddec-stream/ },
             { name: "source", test: /\/src\/source\/|\/node_modules\/@?zarrita\// },
           ],
@@ -169,12 +169,12 @@ export default defineConfig({
     },
   },
   resolve: { alias: CODECS },
-  server: { fs: { allow: [".."] } }, // the schemas lie beside this folder
+  server: { fs: { allow: [".."] } }, // the schemas are beside this folder
   worker: {
     format: "es",
     rolldownOptions: {
       output: {
-        // Its folder is what a service worker may serve: beside index.html, not in assets/.
+        // A service worker may serve only its own folder, so it must be beside index.html and not in assets/.
         entryFileNames: ({ name }) => (name === "sw" ? SERVICE_WORKER : "assets/[name]-[hash].js"),
       },
     },
@@ -189,12 +189,12 @@ export default defineConfig({
           include: ["{src,scripts}/**/*.test.ts"],
           environment: "node",
           setupFiles: "test/support/all_parts.ts",
-          isolate: false, // modules are read once for all files, which is most of what they take
-          testTimeout: 30_000, // on a busy machine the longest takes ten times its second
+          isolate: false, // modules are then loaded once for all files, which takes most of the time
+          testTimeout: 30_000, // the longest test takes a second, and ten times as long on a busy machine
         },
       },
       ofBrowser("browser", { include: ["test/**/*.test.ts"], exclude: [BUILT] }),
-      // what looks at bundles that `make test` builds while it runs the others
+      // Tests of bundles that `make test` builds while the other tests run.
       ofBrowser("built", { include: [BUILT] }),
     ],
   },

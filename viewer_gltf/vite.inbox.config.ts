@@ -1,6 +1,6 @@
 /**
- * The inbox's page: built by itself into the folder of the viewer, so that the two share no chunk. Its code and style
- * lie in a folder of their own, and bundles leave both out.
+ * Builds the inbox's page separately into the folder of the viewer, so that the two share no chunk. Its code and style
+ * are in their own folder, and bundles leave both out.
  */
 import { resolve } from "node:path";
 import { defineConfig, type Plugin } from "vite";
@@ -9,7 +9,7 @@ import { compressAll } from "./scripts/finish_build.ts";
 const PAGE = "inbox.html";
 const FOLDER = "inbox_assets";
 
-/** Compressed files beside those that shrink. */
+/** Writes compressed copies of files that compression makes smaller. */
 function compressPage(): Plugin {
   let folder = "";
   return {
@@ -30,7 +30,7 @@ export default defineConfig({
   build: {
     target: "es2022",
     outDir: "dist",
-    emptyOutDir: false, // the viewer lies there
+    emptyOutDir: false, // the folder contains the viewer
     copyPublicDir: false,
     assetsDir: FOLDER,
     modulePreload: false,

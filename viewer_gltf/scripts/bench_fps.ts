@@ -1,9 +1,9 @@
 /**
- * Frames a second of a bundle in headless Chromium, by the viewer's own benchmark (`?bench`).
+ * Measures frames per second of a bundle in headless Chromium, by the viewer's own benchmark (`?bench`).
  *
  *   npm run build && npm run bench-fps -- OUT BUNDLE [BUNDLE ...]
  *     --size 640x400   CSS pixels
- *     --flight 4       of each run, s
+ *     --flight 4       length of each run, s
  *
  * Writes OUT/<bundle's name>.json and .png.
  */
@@ -36,7 +36,7 @@ try {
   await chromium.close();
 }
 
-/** A build's own name, where a bundle lies in one. */
+/** Returns the name of a bundle's folder, or of the build that contains it. */
 function nameOf(bundle: string): string {
   return basename(bundle) === "bundle" ? basename(dirname(bundle)) : basename(bundle);
 }

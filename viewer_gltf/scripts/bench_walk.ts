@@ -1,11 +1,11 @@
 /**
- * What is on screen and on the GPU while the gaze walks over all tiles of a bundle, row by row.
+ * Measures the load on screen and on the GPU while the gaze moves over all tiles of a bundle, row by row.
  *
  *   npm run build && npm run bench-walk -- BUNDLE [--size 412x780]     CSS pixels
  *
- * The page is driven by its keys in headless Chromium; nothing is drawn, which alters no count.
- * Prints the triangles on screen, the volumes' bytes on the GPU and how many tiles have some, at
- * rest on each tile and the most on the way. Ends with 1 where the gaze has missed a tile.
+ * The page is controlled by its keys in headless Chromium. Nothing is drawn, which does not change the counts. Prints
+ * the triangles on screen, the bytes of volumes on the GPU, and the number of tiles with volumes: at rest on each tile,
+ * and the largest numbers during the walk. The exit code is 1 if the gaze has missed a tile.
  */
 import { readFile } from "node:fs/promises";
 import { join, resolve } from "node:path";
@@ -16,18 +16,18 @@ import { enter, startChromium } from "../test/support/browser/chromium";
 import { Host } from "../test/support/browser/host";
 import { ViewerPage } from "../test/support/browser/page";
 
-/** Key presses after which a walk that meets no end is given up. */
+/** Number of key presses after which a walk that does not end is stopped. */
 const MAX_STEPS = 400;
 
 class Walk {
-  /** At rest, by the tile that is gazed at. */
+  /** The figures at rest, by the tile under the gaze. */
   private readonly met = new Map<string, Snapshot>();
   private readonly seen: Snapshot[] = [];
   private steps = 0;
 
   constructor(private readonly viewer: ViewerPage) {}
 
-  /** Open the page, from the front and so near that a tile fills the picture. */
+  /** Opens the page with the front view, near enough for a tile to fill it. */
   async begin(address: string): Promise<void> {
     await this.viewer.open(address);
     await this.viewer.settled();
@@ -37,7 +37,7 @@ class Walk {
     await this.viewer.settled();
   }
 
-  /** Row by row, to and fro, from one corner to the one across. */
+  /** Walks row by row, alternately to the right and to the left, from one corner to the opposite one. */
   async all(): Promise<void> {
     await this.toTheEnd("Shift+ArrowLeft");
     await this.toTheEnd("Shift+ArrowUp");
@@ -53,7 +53,7 @@ class Walk {
     }
   }
 
-  /** Print the most and the least; 1 where a tile was not gazed at. */
+  /** Prints the figures, and returns the exit code: 1 if a tile was missed. */
   tell(tiles: readonly string[]): number {
     for (const [tile, snapshot] of this.met) this.say(tile, snapshot);
     const most = (of: (each: Snapshot) => number) => Math.max(...this.seen.map(of));
@@ -81,7 +81,7 @@ class Walk {
     while (await this.step(key));
   }
 
-  /** Press a key; false where that has moved nothing. */
+  /** Presses a key; returns false if that has moved nothing. */
   private async step(key: string): Promise<boolean> {
     if (++this.steps > MAX_STEPS) throw new Error("the walk meets no end");
     const before = (await this.viewer.snapshot()).look;
@@ -117,7 +117,7 @@ const host = await Host.start({
 const chromium = await startChromium();
 const browser = await enter(chromium, { viewport: { width, height }, isBlind: true });
 try {
-  // tsx names functions by a helper of its own, those that run in the page too
+  // Code that tsx compiles uses a helper to name functions, also in functions that run in the page.
   await browser.context.addInitScript("globalThis.__name = (each) => each");
   const page = await browser.context.newPage();
   page.on("pageerror", (error) => process.stderr.write(`page: ${error.message}\n`));

@@ -1,9 +1,11 @@
 /**
- * A tile of blue noise by void and cluster (Ulichney, The void-and-cluster method for dither array
- * generation, SPIE 1913, 1993): texels are ranked so that those below any threshold lie as evenly
- * as they can, across the tile's edges too. Writes src/gpu/blue_noise.ts, the same every time:
+ * Makes a tile of blue noise by the method of void and cluster. Texels are ranked so that the texels below any threshold
+ * are spread as evenly as possible, also across the tile's edges. Writes src/gpu/blue_noise.ts, which is the same each
+ * time:
  *
  *   npx tsx scripts/blue_noise.ts
+ *
+ * Reference: Ulichney, The void-and-cluster method for dither array generation, SPIE 1913, 1993.
  */
 import { writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
@@ -11,13 +13,13 @@ import { seeded } from "../test/support/seeded";
 
 const SIZE = 64;
 const SEED = 1993;
-/** Ulichney's choice, in texels. */
+/** Sigma of the Gaussian in texels; Ulichney's choice. */
 const SIGMA = 1.5;
-/** Share of the texels in the pattern that the ranking starts from. */
+/** Share of the texels that are marked in the first pattern. */
 const FIRST_SHARE = 0.1;
 const LINE = 88;
 
-/** Marked texels of a tile, and how crowded every place is: a Gaussian around each of them. */
+/** Marked texels of a tile, and the density at every texel: the sum of a Gaussian around each marked one. */
 class Pattern {
   readonly isMarked: Uint8Array;
   private readonly crowd: Float64Array;
@@ -46,7 +48,7 @@ class Pattern {
     }
   }
 
-  /** The most crowded marked texel (`cluster`) or the loneliest unmarked one (`void`). */
+  /** Returns the marked texel with the highest density (`cluster`) or the unmarked one with the lowest (`void`). */
   extreme(kind: "cluster" | "void"): number {
     const [marked, sign] = kind === "cluster" ? [1, 1] : [0, -1];
     let best = -1;
@@ -65,7 +67,7 @@ class Pattern {
   }
 }
 
-/** Each texel's rank, 0 .. size^2 - 1, x fastest. */
+/** Returns each texel's rank, 0 .. size^2 - 1, x fastest. */
 export function voidAndCluster(size: number, seed: number): Uint16Array {
   const first = new Pattern(size);
   const random = seeded(seed);
@@ -76,7 +78,7 @@ export function voidAndCluster(size: number, seed: number): Uint16Array {
     first.set(at, 1);
     marked++;
   }
-  // Fill the largest void from the tightest cluster until that changes nothing.
+  // Moves the texel of the tightest cluster into the largest void until that changes nothing.
   for (;;) {
     const cluster = first.extreme("cluster");
     first.set(cluster, 0);
@@ -92,8 +94,8 @@ export function voidAndCluster(size: number, seed: number): Uint16Array {
     thinned.set(at, 0);
     ranks[at] = rank;
   }
-  // Beyond the half, Ulichney looks for clusters of unmarked texels: as all Gaussians of a tile add
-  // up to the same everywhere, the tightest of those is the largest void of the marked ones.
+  // When more than half of the texels are marked, Ulichney looks for the tightest cluster of unmarked ones. This is the
+  // same texel as the largest void, since the Gaussians of all texels have the same sum everywhere.
   for (let rank = count; rank < size * size; rank++) {
     const at = first.extreme("void");
     first.set(at, 1);
@@ -102,7 +104,7 @@ export function voidAndCluster(size: number, seed: number): Uint16Array {
   return ranks;
 }
 
-/** 8 bits; every value equally often. */
+/** Returns the ranks as 8-bit numbers; every value occurs equally often. */
 export function blueNoiseTexels(): Uint8Array {
   const ranks = voidAndCluster(SIZE, SEED);
   return Uint8Array.from(ranks, (rank) => Math.floor((256 * rank) / ranks.length));

@@ -20,19 +20,19 @@ type Picture = Readonly<{
   sample: "demo" | "cells" | "mri-demo";
   /** Width and height of the page, CSS pixels. */
   size?: readonly [number, number];
-  /** Words of the page's address. */
+  /** Query of the page's address. */
   query?: string;
   /** The actions of a user before the picture is taken. */
   act?: (viewer: ViewerPage) => Promise<void>;
 }>;
 
-/** How long a sentence about a pressed key stays on the picture, and a little more. */
+/** Time, ms, after which an announcement about a pressed key has disappeared from the view. */
 const SPOKEN_MS = 9000;
 
 const SMALL = [640, 360] as const;
 const WITH_PANEL = [1000, 560] as const;
 
-/** Press keys one after the other, as in the list of keys. */
+/** Returns an action that presses keys one after the other; names are those in the list of keys. */
 function press(...keys: readonly string[]): NonNullable<Picture["act"]> {
   return async (viewer) => {
     for (const key of keys) {
@@ -43,17 +43,17 @@ function press(...keys: readonly string[]): NonNullable<Picture["act"]> {
   };
 }
 
-/** Go nearer by the wheel, which says nothing on the picture. */
+/** Zooms in with the wheel, which makes no announcement on the view. */
 async function goNearer(viewer: ViewerPage): Promise<void> {
   const box = await viewer.page.locator(".stage").boundingBox();
   if (box === null) throw new Error("the page has no picture");
   await viewer.page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   for (let i = 0; i < 4; i++) await viewer.page.mouse.wheel(0, -200);
-  await viewer.page.waitForTimeout(1000); // a turn of the wheel goes on for a while
+  await viewer.page.waitForTimeout(1000); // the zoom continues for a moment
   await viewer.settled();
 }
 
-/** Click at a place of the picture, as shares of its width and height. */
+/** Clicks at a place of the view, given as shares of its width and height. */
 async function click(viewer: ViewerPage, across: number, down: number): Promise<void> {
   const box = await viewer.page.locator(".stage").boundingBox();
   if (box === null) throw new Error("the page has no picture");
@@ -61,7 +61,7 @@ async function click(viewer: ViewerPage, across: number, down: number): Promise<
   await viewer.settled();
 }
 
-/** Bring a section of the panel into sight, open. */
+/** Opens a section of the panel and scrolls it into view. */
 async function show(viewer: ViewerPage, section: string): Promise<void> {
   await viewer.unfold(section);
   await viewer.page.locator(`h2 [data-opener="${section}"]`).scrollIntoViewIfNeeded();

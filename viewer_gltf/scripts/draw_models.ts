@@ -1,9 +1,9 @@
 /**
- * Pictures of files by programs for the web that are not ours: three.js and CesiumJS.
+ * Draws pictures of files with other web programs: three.js and CesiumJS.
  *
  *   npx tsx scripts/draw_models.ts JOBS.json
  *
- * JOBS.json is a list of `Job`. A picture's alpha is the silhouette of what was drawn.
+ * JOBS.json is a list of `Job`. A picture's alpha is the silhouette of the drawn model.
  */
 import { readFile, writeFile } from "node:fs/promises";
 import { basename, dirname } from "node:path";
@@ -11,14 +11,14 @@ import type * as CesiumModule from "cesium";
 import { enter, startChromium } from "../test/support/browser/chromium";
 import { Host } from "../test/support/browser/host";
 
-/** A camera that looks along -z in the numbers of a file, y up; `slopes` are half of the picture at a distance of 1. */
+/** A camera that looks along -z of a file's axes, y up; `slopes` are half the picture's size at a distance of 1. */
 type View = Readonly<{
   eye: readonly [number, number, number];
   slopes: readonly [number, number];
   near: number;
   far: number;
 }>;
-/** Distant lights by where they come from, and the intensity of usd_assets/studio.exr all around. */
+/** Distant lights by the directions from which they come, and the intensity of the environment usd_assets/studio.exr. */
 type Lights = Readonly<{
   suns: readonly Readonly<{
     color: readonly [number, number, number];
@@ -31,7 +31,7 @@ type Job = Readonly<{
   program: "three" | "cesium";
   file: string;
   view: View;
-  /** For three.js alone: Cesium has light of its own. */
+  /** Lights for three.js only; Cesium has its own. */
   lights: Lights;
   pixels: readonly [number, number];
   picture: string;
@@ -93,7 +93,7 @@ declare global {
   }
 }
 
-/** Draws a model by Cesium, on the equator, so large that its near plane of 0.1 m is no limit. */
+/** Draws a model with Cesium on the equator, scaled so that the near plane of 0.1 m does not cut it. */
 async function drawByCesium([address, view]: readonly [string, View]): Promise<string> {
   const { Cesium } = window;
   document.querySelector("#view")?.replaceChildren();
@@ -102,7 +102,7 @@ async function drawByCesium([address, view]: readonly [string, View]): Promise<s
     globe: false,
     skyBox: false,
     skyAtmosphere: false,
-    msaaSamples: 1, // else each pixel that is touched at all has a full alpha
+    msaaSamples: 1, // with more samples, each partly covered pixel would have full alpha
     creditContainer: document.createElement("div"),
     contextOptions: { webgl: { alpha: true, preserveDrawingBuffer: true } },
   });
@@ -114,7 +114,7 @@ async function drawByCesium([address, view]: readonly [string, View]): Promise<s
   const model = await Cesium.Model.fromGltfAsync({
     url: address,
     modelMatrix,
-    forwardAxis: Cesium.Axis.X, // so that the file's (x, y, z) is (x, -z, y) of the place
+    forwardAxis: Cesium.Axis.X, // the file's (x, y, z) thus becomes (x, -z, y) at that place
     incrementallyLoadTextures: false,
   } as Parameters<typeof CesiumModule.Model.fromGltfAsync>[0]);
   const at = ([x, y, z]: readonly [number, number, number]) =>
@@ -173,7 +173,7 @@ try {
       const [width, height] = pixels;
       const browser = await enter(chromium, { viewport: { width, height }, pixelRatio: 1 });
       const page = await browser.context.newPage();
-      // tsx names functions by a helper that the page does not have
+      // Code that tsx compiles names functions by a helper, which the page does not have.
       await page.addInitScript({ content: "globalThis.__name = (named) => named;" });
       const errors: string[] = [];
       page.on("pageerror", (error) => errors.push(error.message));

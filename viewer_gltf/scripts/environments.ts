@@ -1,5 +1,5 @@
 /**
- * Write the two built-in environments: public/environments/NAME.hdr, Radiance's RGBE (Ward 1991),
+ * Writes the two built-in environments: public/environments/NAME.hdr, Radiance's RGBE (Ward 1991),
  * 64 x 32 directions, y up. `npx tsx scripts/environments.ts`
  */
 import { mkdir, writeFile } from "node:fs/promises";
@@ -10,9 +10,9 @@ const FOLDER = new URL("../public/environments/", import.meta.url);
 
 type Vec3 = readonly [number, number, number];
 
-/** How bright it is in each direction; x right, y up, z towards the viewer. */
+/** Radiance of each environment by direction; x to the right, y up, z towards the viewer. */
 const ROOMS: Readonly<Record<string, (dir: Vec3) => Vec3>> = {
-  // a grey room with a wide soft light above the viewer, and a strip at either side
+  // A grey room with a wide soft light above the viewer, and a strip of light on each side.
   studio: ([x, y, z]) => {
     const above = Math.exp(-6 * (1 - (0.75 * y + 0.66 * z)));
     const strips = Math.exp(-40 * (Math.abs(x) - 0.92) ** 2) * Math.exp(-3 * y * y);
@@ -23,7 +23,7 @@ const ROOMS: Readonly<Record<string, (dir: Vec3) => Vec3>> = {
       grey + 2.35 * above + 0.65 * strips,
     ];
   },
-  // a clear sky, brighter towards the horizon, with a low warm sun; dark ground
+  // A clear sky, brighter towards the horizon, with a low warm sun above dark ground.
   sky: ([x, y, z]) => {
     const sun = 60 * Math.exp(-180 * (1 - (0.55 * x + 0.5 * y + 0.67 * z)));
     if (y < 0) return [0.12 + 0.05 * y, 0.11 + 0.05 * y, 0.1 + 0.05 * y];
@@ -52,7 +52,7 @@ for (const [name, bright] of Object.entries(ROOMS)) {
   for (let row = 0; row < HEIGHT; row++) {
     for (let column = 0; column < WIDTH; column++) {
       const down = ((row + 0.5) / HEIGHT) * Math.PI;
-      const round = ((column + 0.5) / WIDTH) * 2 * Math.PI; // from -z over +x
+      const round = ((column + 0.5) / WIDTH) * 2 * Math.PI; // angle that begins at -z and increases towards +x
       const dir = [
         Math.sin(down) * Math.sin(round),
         Math.cos(down),

@@ -9,14 +9,14 @@ declare global {
 const asModule = (code: string) => import(`data:text/javascript,${encodeURIComponent(code)}`);
 
 describe("the viewer's code", () => {
-  it("has its address from the page, wherever it runs", async () => {
+  it("takes its address from the page, wherever it runs", async () => {
     globalThis.stereocellBase = "https://host.test/some/folder/assets/";
     const code = "export const worker=new URL(`worker.js`,import.meta.url).href";
     const { worker } = await asModule(movable(code, "index-1.js"));
     expect(worker).toBe("https://host.test/some/folder/assets/worker.js");
   });
 
-  it("imports its other parts from beside the page's, once they are wanted", () => {
+  it("imports its other parts from the page's folder when they are needed", () => {
     const code = "const load=()=>import(`./part-1.js`),other=()=>import('./part-2.js')";
     const moved = movable(code, "index-1.js");
     expect(moved).not.toMatch(/import\([`'"]/);
@@ -24,7 +24,7 @@ describe("the viewer's code", () => {
     expect(moved).toContain('new URL("part-2.js",globalThis.stereocellBase)');
   });
 
-  it("hands its exports on, the same ones, by their names", async () => {
+  it("passes on the same exports under their names", async () => {
     const one = { name: "one" };
     globalThis.stereocellCode = Promise.resolve({ a: one, $: 2, in: 3 });
     const { a, $, in: reserved } = await asModule(handOn(["a", "$", "in"]));

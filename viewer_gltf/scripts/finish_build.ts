@@ -1,14 +1,14 @@
 /**
- * What is done to the built page:
+ * Finishes the built page:
  *
- * 1. The viewer's code and style are packed by gzip into files that the page's own script fetches and
- *    unpacks (boot/load.js), so that any static host sends a third of them. In the place of the code stands a
- *    module that hands its exports on to the parts that are fetched later; the code itself lies beside,
- *    for browsers that can't unpack.
- * 2. The page gets that script, a skeleton to look at meanwhile (boot/skeleton.css), and the hashes of
+ * 1. The viewer's code and style are compressed by gzip into files that the page's own script fetches and
+ *    unpacks (boot/load.js), so that any static host sends a third of the bytes. A module in the place of the code
+ *    passes its exports on to the parts that load later. The code itself is in a file beside it, for browsers that
+ *    can't unpack.
+ * 2. The page gets that script, a skeleton that is visible meanwhile (boot/skeleton.css), and the hashes of
  *    both in its policy.
- * 3. The service worker is told what the viewer of this build consists of.
- * 4. .gz and .br of all that shrinks are written beside, for servers that send those.
+ * 3. The service worker gets the list of the files of this build.
+ * 4. Compressed copies (.gz and .br) of all compressible files are written beside them, for servers that send those.
  */
 import { createHash } from "node:crypto";
 import { readdir, readFile, writeFile } from "node:fs/promises";
@@ -21,13 +21,13 @@ const SERVICE_WORKER = "sw.js";
 const PAGE = "index.html";
 const FILES = /(["'`])__VIEWER_FILES__\1/;
 const BOOT = new URL("../boot/", import.meta.url);
-/** The page's style, as Vite links it. */
+/** The link to the page's style that Vite writes. */
 const STYLE = /<link rel="stylesheet"[^>]* href="\.\/([^"]+\.css)"/;
-/** What is packed already gains nothing. */
+/** Endings of files that compression makes smaller; other files are already compressed. */
 const SHRINKS = new Set([".js", ".css", ".html", ".json", ".svg", ".wasm", ".webmanifest"]);
 /** Parts of the page that read a source without a bundle. */
 const OF_SOURCES = /(^|\/)source[_-]/;
-/** Less than a packet of the network. */
+/** Smallest file that is compressed, bytes; smaller ones fit into a network packet anyway. */
 const MIN_BYTES = 1000;
 
 const gzipped = (bytes: Buffer) => promisify(gzip)(bytes, { level: 9 });
@@ -35,11 +35,11 @@ const brotlied = (bytes: Buffer) =>
   promisify(brotliCompress)(bytes, {
     params: { [constants.BROTLI_PARAM_SIZE_HINT]: bytes.length },
   });
-/** Characters of a file in which its imports are. */
+/** Number of characters at the start of a file that contain its imports. */
 const HEAD = 4000;
 const hashOf = (text: string) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
 
-/** The code as it runs from anywhere: its own address is the one that the page says. */
+/** Returns the code in a form that runs from any address; it takes its own address from the page. */
 export function movable(code: string, name: string): string {
   const address = `new URL(${JSON.stringify(name)},globalThis.stereocellBase).href`;
   return code
@@ -49,14 +49,14 @@ export function movable(code: string, name: string): string {
     });
 }
 
-/** A module with the exports of the code that the page has fetched: short names, among them `in` and `do`. */
+/** Returns a module with the exports of the code that the page has fetched; short names include `in` and `do`. */
 export function handOn(names: readonly string[]): string {
   const local = names.map((name, i) => `$${i}=code.${name}`);
   const list = names.map((name, i) => `$${i} as ${name}`);
   return `const code=await globalThis.stereocellCode,${local.join()};export{${list.join()}};`;
 }
 
-/** The code in a file of its own, to be packed beside; in its old place what hands its exports on. */
+/** Writes the code into a separate file, which is then compressed, and in its old place the module with its exports. */
 async function splitCode(
   folder: string,
   entry: string,
@@ -73,7 +73,7 @@ async function splitCode(
   return plain;
 }
 
-/** The page's script, with what it needs to know of code and style. */
+/** Returns the page's script with the data about code and style that it needs. */
 async function scriptFor(folder: string, plain: string, style: string): Promise<string> {
   const code = await readFile(join(folder, plain));
   const build = {
@@ -93,7 +93,7 @@ async function scriptFor(folder: string, plain: string, style: string): Promise<
   return bare.replace("const BUILD = {}", () => `const BUILD = ${JSON.stringify(build)}`);
 }
 
-/** Put script and skeleton into the page, in place of what loads code and style as they lie. */
+/** Puts script and skeleton into the page, in place of the elements that load code and style directly. */
 async function writePage(path: string, script: string): Promise<void> {
   const style = (await readFile(new URL("skeleton.css", BOOT), "utf8"))
     .replace(/\/\*.*?\*\//gs, "")
@@ -103,7 +103,7 @@ async function writePage(path: string, script: string): Promise<void> {
     '<progress value="0" aria-label="Loading the viewer"></progress><p role="status"></p></main><aside></aside></div>';
   const page = (await readFile(path, "utf8"))
     .replace(/\s*<script type="module"[^>]*><\/script>/, "")
-    // a disabled link is not fetched; by its address later parts see that the style is there
+    // A disabled link is not fetched. Later parts see from its address that the style is already loaded.
     .replace('<link rel="stylesheet"', "$& disabled")
     .replace("</head>", () => `<style>${style}</style>\n  </head>`)
     .replace('<div id="app">', (opening) => `${opening}${skeleton}`)
@@ -113,14 +113,14 @@ async function writePage(path: string, script: string): Promise<void> {
   await writeFile(path, page);
 }
 
-/** Tell the service worker, which has a fixed name, the viewer's files. */
+/** Writes the list of the viewer's files into the service worker, which has a fixed name. */
 async function listFiles(folder: string, packed: readonly string[]): Promise<void> {
   const path = join(folder, SERVICE_WORKER);
   const code = await readFile(path, "utf8");
   if (!FILES.test(code)) throw new Error(`${path}: no place for the list of files`);
   const names = (await filesOf(folder))
     .filter((name) => name !== SERVICE_WORKER && name !== PAGE && !packed.includes(name))
-    .filter((name) => !OF_SOURCES.test(name)) // a source is shown with a network alone
+    .filter((name) => !OF_SOURCES.test(name)) // a source can be shown only with a network
     .concat(packed.map((name) => `${name}.gz`))
     .sort();
   const list = JSON.stringify(JSON.stringify(names));
@@ -137,7 +137,7 @@ async function filesOf(folder: string): Promise<string[]> {
     .map((entry) => join(entry.parentPath, entry.name).slice(folder.length + 1));
 }
 
-/** Write compressed files beside those of `files` that shrink. */
+/** Writes compressed copies of those files that compression makes smaller. */
 export async function compressAll(folder: string, files: readonly string[]): Promise<void> {
   const names = files.filter((name) => SHRINKS.has(extname(name)));
   const compress = async (name: string) => {
@@ -158,11 +158,11 @@ export function finishBuild(): Plugin {
       folder = resolve(config.root, config.build.outDir);
     },
     async writeBundle(_, bundle) {
-      if (!(SERVICE_WORKER in bundle)) return; // the tests' own small pages have none
+      if (!(SERVICE_WORKER in bundle)) return; // small pages of the tests have no service worker
       const files = Object.values(bundle);
       const entry = files.find((file) => file.type === "chunk" && file.isEntry);
       const page = join(folder, PAGE);
-      // parts that are fetched later have styles of their own
+      // The link in the page names its style; parts that load later have their own styles.
       const [, style] = (await readFile(page, "utf8")).match(STYLE) ?? [];
       if (entry?.type !== "chunk" || style === undefined) throw new Error("no code, or no style");
       const plain = await splitCode(folder, entry.fileName, entry.exports);

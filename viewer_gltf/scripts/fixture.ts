@@ -1,4 +1,4 @@
-/** Write the tests' synthetic bundle, to look at it: `npm run fixture -- FOLDER`. */
+/** Writes the synthetic bundle of the tests to a folder: `npm run fixture -- FOLDER`. */
 import { writeFixture } from "../test/support/fixture/bundle";
 
 const [folder] = process.argv.slice(2);

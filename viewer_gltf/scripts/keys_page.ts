@@ -1,10 +1,10 @@
-/** The page of all keys, docs/keys.md, made from the viewer's own tables by `npm run keys-page`. */
+/** Makes docs/keys.md, the page of all keys, from the viewer's own tables: `npm run keys-page`. */
 import { KEYS } from "../test/support/panel/all_keys";
 
 const BEGIN = "<!-- begin of `npm run keys-page` -->\n";
 const END = "<!-- end of `npm run keys-page` -->";
 
-/** A key as it is printed in the page. A backtick stands between two backticks of Markdown. */
+/** Returns a key in Markdown. A key that is a backtick needs double backticks around it. */
 function shown(name: string): string {
   const text = name.replace("Arrow", "").replace(/^ $/, "Space");
   const code = text.includes("`") ? `\`\` ${text} \`\`` : `\`${text}\``;
@@ -18,7 +18,7 @@ function section(group: (typeof KEYS.groups)[number]): string {
   return `## ${group.name}\n\n| key | what it does |\n|---|---|\n${rows.join("")}`;
 }
 
-/** The page with the keys of this version between its two marks. */
+/** Returns the page with the keys of this version between its two marks. */
 export function pageOfKeys(text: string): string {
   const [before, rest] = text.split(BEGIN);
   const [, after] = (rest ?? "").split(END);

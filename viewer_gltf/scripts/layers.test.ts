@@ -4,7 +4,7 @@ import { against, arrowsOf, circles, partsOf, usersOfHost } from "./layers";
 const arrow = (from: string, to: string) => ({ from, to });
 
 describe("the layers", () => {
-  it("see imports of every kind, and none from packages or from outside", () => {
+  it("include imports of every kind, except from packages and from outside", () => {
     const text = `
       import type { Vec3 } from "../math/vec3";
       import "./panel.css";
@@ -27,14 +27,14 @@ describe("the layers", () => {
     ]);
   });
 
-  it("let imports go down and sideways, never up", () => {
+  it("allow imports from the same and from lower layers, never from higher ones", () => {
     const down = arrow("app/viewer.ts", "math/vec3.ts");
     const sideways = arrow("xr/stereo.ts", "xr/session.ts");
     const up = arrow("math/vec3.ts", "state/reduce.ts");
     expect(against([down, sideways, up])).toEqual([up]);
   });
 
-  it("find parts by their part.ts, and let no part import another", () => {
+  it("recognise parts by their part.ts, and let no part import another", () => {
     const parts = partsOf(["slices/part.ts", "ruler/part.ts", "ruler/ticks.ts", "host/part.ts"]);
     expect([...parts]).toEqual(["slices", "ruler"]);
     const within = arrow("ruler/part.ts", "ruler/ticks.ts");
@@ -55,13 +55,13 @@ describe("the layers", () => {
     expect(usersOfHost(files, partsOf(files))).toEqual(["slices/part.ts", "app/main.ts"]);
   });
 
-  it("refuse a folder that is none of them", () => {
+  it("refuse a folder that is in no layer", () => {
     const astray = arrow("helpers/all.ts", "math/vec3.ts");
     const lost = arrow("app/viewer.ts", "helpers/all.ts");
     expect(against([astray, lost])).toEqual([astray, lost]);
   });
 
-  it("find circles, each once, and nothing else", () => {
+  it("report each circle of imports exactly once", () => {
     const open = [arrow("a/1.ts", "a/2.ts"), arrow("a/2.ts", "a/3.ts")];
     expect(circles(open)).toEqual([]);
     expect(circles([...open, arrow("a/3.ts", "a/2.ts"), arrow("a/4.ts", "a/1.ts")])).toEqual([

@@ -1,8 +1,8 @@
 /**
- * The folders of src/ lie in layers: a file imports from its own folder and from those below, types
- * and tests too, and no import leads round in a circle. All parts, folders with a part.ts, share one
- * layer, and none imports another: so a new part needs no line here. No file above the host reaches through it (see
- * reach.ts). `npm run lint` holds it by this.
+ * Checks the layers of the folders of src/; `npm run lint` runs it. A file may import only from its own folder and from
+ * lower layers, including types and tests, and imports must not form a circle. All parts, which are folders with a
+ * part.ts, share one layer, and no part imports another. A new part thus needs no line here. No file above the host
+ * reaches through it (see reach.ts).
  *
  *   npx tsx scripts/layers.ts
  */
@@ -14,7 +14,7 @@ import { reachesOf } from "./reach";
 /** The layer of all parts. */
 const PARTS = "parts";
 
-/** From the lowest. */
+/** The layers, lowest first. */
 export const LAYERS: readonly string[] = [
   "math",
   "gpu",
@@ -36,10 +36,10 @@ export const LAYERS: readonly string[] = [
   "inbox",
 ];
 
-/** A file and one that it imports, below src/. */
+/** A file and a file that it imports; both paths are relative to src/. */
 export type Arrow = Readonly<{ from: string; to: string }>;
 
-/** The imports of a file that lead to files of src/: static ones, dynamic ones, of types alone. */
+/** Returns a file's imports of files in src/: static imports, dynamic imports and imports of types. */
 export function arrowsOf(from: string, text: string): readonly Arrow[] {
   const addresses = text.matchAll(/\b(?:from|import)\s*\(?\s*"(\.{1,2}\/[^"?]+)/g);
   return [...addresses]
@@ -50,7 +50,7 @@ export function arrowsOf(from: string, text: string): readonly Arrow[] {
 
 const roomOf = (path: string) => path.split("/")[0];
 
-/** The folders that are parts: they have a part.ts, and no line among the layers. */
+/** Returns the folders that are parts: they have a part.ts, and are not in the list of layers. */
 export function partsOf(files: readonly string[]): ReadonlySet<string> {
   const rooms = files.filter((file) => /^\w+\/part\.ts$/.test(file)).map(roomOf);
   return new Set(rooms.filter((room) => !LAYERS.includes(room)));
@@ -69,7 +69,7 @@ export function against(
   });
 }
 
-/** The files above the host, which use it. */
+/** Returns the files above the host, which use it. */
 export function usersOfHost(
   files: readonly string[],
   parts: ReadonlySet<string>,
@@ -81,7 +81,7 @@ export function usersOfHost(
   });
 }
 
-/** The files that can be reached from themselves, circle by circle. */
+/** Returns the circles of imports, each as a list of files. */
 export function circles(arrows: readonly Arrow[]): readonly (readonly string[])[] {
   const next = new Map<string, string[]>();
   for (const { from, to } of arrows) next.set(from, [...(next.get(from) ?? []), to]);

@@ -13,11 +13,11 @@ const modules = {
   getModuleInfo: (id: string) => (id in IMPORTS ? { importedIds: IMPORTS[id] } : null),
 };
 
-it("puts what the page imports, also round in a circle, into one file", () => {
+it("puts all modules that the page imports, also in a circle, into one file", () => {
   expect([...reachOf("page", modules)].sort()).toEqual(["main", "page", "ring", "shared"]);
 });
 
-it("leaves the parts that come later to the bundler", () => {
+it("leaves parts that load later to the bundler", () => {
   const nameOf = oneChunk("page", "index");
   expect(nameOf("shared", modules)).toBe("index");
   expect(["part", "own"].map((id) => nameOf(id, modules))).toEqual([null, null]);

@@ -1,13 +1,13 @@
 /**
- * The page's own code in one file, whatever the parts that come later share with it: the build packs
- * that file (finish_build.ts), and a file for each shared module would be a request more before the first
- * picture.
+ * Puts the page's own code into one file, including modules that it shares with parts that load later. The build
+ * compresses that file (finish_build.ts). A separate file for each shared module would need one more request before the
+ * first frame.
  */
 type Modules = Readonly<{
   getModuleInfo: (id: string) => Readonly<{ importedIds: readonly string[] }> | null;
 }>;
 
-/** All that a module imports, itself included, but for what it imports when it is wanted. */
+/** Returns a module and all modules that it imports directly or indirectly, except by dynamic imports. */
 export function reachOf(entry: string, modules: Modules): ReadonlySet<string> {
   const reach = new Set<string>();
   const waiting = [entry];
@@ -19,7 +19,7 @@ export function reachOf(entry: string, modules: Modules): ReadonlySet<string> {
   return reach;
 }
 
-/** The name of the file that a module goes to; null: the bundler's choice. */
+/** Returns a function that names the file for a module; null leaves the choice to the bundler. */
 export function oneChunk(entry: string, name: string) {
   let reach: ReadonlySet<string> | null = null;
   return (id: string, modules: Modules): string | null => {

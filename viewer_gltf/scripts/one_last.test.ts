@@ -5,7 +5,7 @@ import { LAST, OneLast } from "./one_last";
 
 const TESTS = new URL("../test/", import.meta.url).pathname;
 
-it("leaves the order of the files of tests as it is, but for the last one, which is there", async () => {
+it("keeps the order of the test files, except for the last one, which exists", async () => {
   const cache = { getFileTestResults: () => undefined, getFileStats: () => undefined };
   const order = new OneLast({ cache, config: { root: TESTS } } as unknown as Vitest);
   const project = { name: "browser", config: { sequence: { groupOrder: 0 }, isolate: false } };

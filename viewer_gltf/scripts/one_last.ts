@@ -1,12 +1,12 @@
 import { BaseSequencer, type TestSpecification } from "vitest/node";
 
 /**
- * What a visit of 40 s keeps is what a device fetches and draws in them: last, when the tests of Python,
- * which run beside these, have left the cores.
+ * Test file that runs last. It tests a visit of 40 s, whose result depends on the speed of fetching and drawing. The
+ * Python tests, which run at the same time, have then finished and no longer use the cores.
  */
 export const LAST = "offline/first_visit.built";
 
-/** The files of tests in vitest's order, but for the one that is last. */
+/** Sorts test files in vitest's order, except for the one that runs last. */
 export class OneLast extends BaseSequencer {
   override async sort(files: TestSpecification[]): Promise<TestSpecification[]> {
     const isLast = ({ moduleId }: TestSpecification) => moduleId.endsWith(`/test/${LAST}.test.ts`);

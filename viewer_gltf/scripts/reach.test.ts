@@ -4,7 +4,7 @@ import { reachesOf } from "./reach";
 const chainsOf = (text: string) => reachesOf("part.ts", text).map(({ chain }) => chain);
 
 describe("a part", () => {
-  it("asks the host for things two dots away, and no farther", () => {
+  it("may use members of the host at most two dots away", () => {
     expect(chainsOf("host.viewpoint.lookFrom(view);")).toEqual([]);
     expect(chainsOf("host.display.viewpoint.lookFrom(view);")).toEqual([
       "host.display.viewpoint.lookFrom",
@@ -14,7 +14,7 @@ describe("a part", () => {
     ]);
   });
 
-  it("reaches no farther by taking things out of the host", () => {
+  it("may not reach farther by destructuring the host", () => {
     const patterns = [
       "const { display } = host; display.stereo.end();",
       "const { stereo } = host.display; stereo.end();",
@@ -27,13 +27,13 @@ describe("a part", () => {
     for (const text of patterns) expect(chainsOf(text), text).toEqual(["host.display.stereo.end"]);
   });
 
-  it("reads plain data as deep as they go", () => {
+  it("may read plain data to any depth", () => {
     expect(chainsOf("host.bundle.manifest.specimen.name.length;")).toEqual([]);
     expect(chainsOf("const { manifest } = host.bundle; manifest.specimen.bounds_um;")).toEqual([]);
     expect(chainsOf("host.panel.view.open.length;")).toEqual([]);
   });
 
-  it("may use what a call gives back, and things that are no host's", () => {
+  it("may use the result of a call, and objects that do not belong to the host", () => {
     expect(chainsOf('host.service("page")?.focus("share", "link");')).toEqual([]);
     expect(chainsOf("window.display.stereo.end(); this.options.a.b.c;")).toEqual([]);
     expect(chainsOf("function go(host: string) { host.length; }")).toEqual([]);
@@ -43,7 +43,7 @@ describe("a part", () => {
     ).toEqual([]);
   });
 
-  it("is found by its line", () => {
+  it("is reported with the line", () => {
     expect(reachesOf("part.ts", "\n\nhost.a.b.c();")).toEqual([{ line: 3, chain: "host.a.b.c" }]);
   });
 });

@@ -1,24 +1,24 @@
 /**
- * A part asks the host for things, and does not reach through them: `host.viewpoint.lookFrom(view)` is fine, and
- * `host.display.viewpoint.lookFrom(view)` is not. What a part takes out of the host by a pattern counts as well:
- * `const { viewpoint } = host.display` is two dots, and `viewpoint.lookFrom(view)` after it the third.
+ * Checks that a part uses members of the host, and does not reach through them: `host.viewpoint.lookFrom(view)` is
+ * allowed, and `host.display.viewpoint.lookFrom(view)` is not. Destructuring counts as well:
+ * `const { viewpoint } = host.display` has two dots, and `viewpoint.lookFrom(view)` after it adds the third.
  */
 import { parseSync } from "vite";
 
-/** Most dots from the host to what a part uses. */
+/** Largest number of dots between the host and a member that a part uses. */
 const MOST_DOTS = 2;
-/** Plain data, which may be read as deep as it goes. */
+/** Members with plain data, which may be read to any depth. */
 const PLAIN: ReadonlySet<string> = new Set([
-  ...["bundle", "focus", "state"], // of the host
-  ...["facts", "ranges", "view"], // of the panel
-  ...["cameraView", "cameraPose"], // of the viewpoint
+  ...["bundle", "focus", "state"], // members of the host
+  ...["facts", "ranges", "view"], // members of the panel
+  ...["cameraView", "cameraPose"], // members of the viewpoint
 ]);
-/** Types of the host as a parameter has them. */
+/** Types of parameters that are the host. */
 const HOSTS: ReadonlySet<string> = new Set(["PartHost", "Host"]);
 
-/** A node of the syntax tree: the parser's types are a union of all kinds. */
+/** A node of the syntax tree of any kind. */
 type Node = Readonly<{ type: string; start: number }> & Readonly<Record<string, unknown>>;
-/** The names on the way from the host to a value; null: it does not come from the host. */
+/** The names of the members from the host to a value; null if the value does not come from the host. */
 type Path = readonly string[] | null;
 /** A chain that is too long, and its line. */
 export type Reach = Readonly<{ line: number; chain: string }>;
@@ -32,7 +32,7 @@ function childrenOf(node: Node): readonly Node[] {
     .filter(isNode);
 }
 
-/** An object that has the host: only its `host` leads on. */
+/** The path of `this`, an object that has the host as its member `host`. */
 const THIS: Path = ["this"];
 
 function stepOf(path: Path, name: string): Path {
@@ -40,7 +40,7 @@ function stepOf(path: Path, name: string): Path {
   return path && [...path, name];
 }
 
-/** The names that are known in a block, and those of the blocks around it. */
+/** The names in a block and in the blocks around it, with their paths. */
 class Scope {
   private readonly names = new Map<string, Path>();
 
@@ -52,13 +52,13 @@ class Scope {
     return this.outer === null ? (name === "host" ? [] : null) : this.outer.find(name);
   }
 
-  /** Gives the names of a pattern the places of what they take out. */
+  /** Stores the paths of the names in a destructuring pattern. */
   bind(pattern: Node, path: Path): void {
     if (pattern.type === "Identifier") this.names.set(String(pattern.name), path);
     else if (pattern.type === "AssignmentPattern") this.bind(pattern.left as Node, path);
     else if (pattern.type === "ObjectPattern") {
       for (const property of pattern.properties as readonly Node[]) {
-        if (property.type !== "Property") continue; // what is left over is none of the host's own
+        if (property.type !== "Property") continue; // a rest element is a new object, not a member of the host
         const name = String((property.key as Node).name);
         this.bind(property.value as Node, stepOf(path, name));
       }
@@ -66,13 +66,13 @@ class Scope {
   }
 }
 
-/** Whether a parameter is declared as the host. */
+/** Returns whether a parameter is declared as the host. */
 function isHost(parameter: Node): boolean {
   const annotation = (parameter.typeAnnotation as Node | null)?.typeAnnotation as Node | undefined;
   return HOSTS.has(String((annotation?.typeName as Node | undefined)?.name));
 }
 
-/** Where the value of an expression lies. */
+/** Returns the path of an expression's value. */
 function pathOf(node: Node, scope: Scope): Path {
   if (node.type === "ThisExpression") return THIS;
   if (node.type === "Identifier") return scope.find(String(node.name));
@@ -81,13 +81,13 @@ function pathOf(node: Node, scope: Scope): Path {
   return stepOf(pathOf(node.object as Node, scope), String((node.property as Node).name));
 }
 
-/** How many dots lead to it: plain data are one thing. */
+/** Returns the number of dots of a path; all names from a member with plain data on count as one. */
 function dotsOf(path: readonly string[]): number {
   const plain = path.findIndex((name) => PLAIN.has(name));
   return plain === -1 ? path.length : plain + 1;
 }
 
-/** The chains of a file that reach through the host. */
+/** Returns the chains of a file that reach through the host. */
 export function reachesOf(file: string, text: string): readonly Reach[] {
   const found = new Map<number, Reach>();
   const note = (path: Path, { start }: Node) => {
@@ -106,7 +106,7 @@ export function reachesOf(file: string, text: string): readonly Reach[] {
     if (node.type === "MemberExpression") {
       const path = pathOf(node, scope);
       note(path, node);
-      if (path !== null) return; // its beginnings are shorter
+      if (path !== null) return; // the shorter chains within this one need no check
     }
     const isFunction = Array.isArray(node.params);
     const inner = isFunction || node.type === "BlockStatement" ? new Scope(scope) : scope;

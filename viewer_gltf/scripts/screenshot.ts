@@ -1,5 +1,5 @@
 /**
- * A picture of a bundle, drawn by headless Chromium.
+ * Draws a picture of a bundle with headless Chromium.
  *
  *   npm run build && npm run screenshot -- BUNDLE OUT.png [options]
  *     --size 1280x720        CSS pixels

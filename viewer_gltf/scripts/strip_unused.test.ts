@@ -29,7 +29,7 @@ it("keeps the loader's classes for all extensions that the pipeline writes", asy
   ]);
 });
 
-it("finds no schema that asks for a format", async () => {
+it("finds no schema that requires a format", async () => {
   const names = (await readdir(SCHEMAS)).filter((name) => name.endsWith(".schema.json"));
   expect(names.length).toBeGreaterThan(5);
   for (const name of names) {

@@ -1,16 +1,16 @@
-/** Leaves parts of libraries out of the page that none of the bundle's files can need. */
+/** Removes parts of libraries from the page that no file of a bundle needs. */
 import type { Plugin } from "vite";
 
-/** The extensions that surfaces of a bundle have and three's loader reads by a class of its own. */
+/** Extensions of a bundle's surfaces for which three's loader has its own class. */
 const KEPT = /GLTFTextureBasisUExtension|EXT_MESHOPT_COMPRESSION/;
 const REGISTERED = /this\.register\( function \( parser \) \{\s*return new (.*) \);\s*\} \);/g;
 
-/** Return three's glTF loader without the extensions that no surface of a bundle has. */
+/** Returns the code of three's glTF loader without the extensions that no surface of a bundle has. */
 export function withoutExtensions(code: string): string {
   return code.replace(REGISTERED, (text, made: string) => (KEPT.test(made) ? text : ""));
 }
 
-/** Whether a schema asks that a text be a date, an address or the like. */
+/** Returns whether a schema requires a text to be a date, an address or another format. */
 export function asksForFormat(schema: string): boolean {
   return /"format":\s*"/.test(schema);
 }

@@ -104,7 +104,7 @@ async function readStates(name: string, module: string): Promise<string> {
   return `/** From ${module}. */\nexport const ${name} = ${JSON.stringify(values, null, 2)} as const;\n`;
 }
 
-/** make goes by dates: what is the same stays as old as it is. */
+/** Writes a file only if its text has changed, because make compares the times of files. */
 async function writeChanged(name: string, text: string): Promise<void> {
   const file = new URL(name, OUT);
   const before = await readFile(file, "utf8").catch(() => null);

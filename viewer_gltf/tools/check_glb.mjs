@@ -1,6 +1,6 @@
 /**
- * Run the Khronos glTF validator over .glb files: each as it is, and once more with
- * EXT_meshopt_compression undone, since the validator can't look inside it.
+ * Runs the Khronos glTF validator on .glb files. Each file is checked as it is, and again without
+ * EXT_meshopt_compression, because the validator can't read compressed data.
  *
  * stdin: JSON array of paths. stdout: JSON array of {path, problems}, in the same order.
  */
@@ -15,7 +15,7 @@ import { bytesOf, packGlb, unpackGlb } from "./glb.mjs";
 const COMPRESSION = "EXT_meshopt_compression";
 const MAX_PROBLEMS = 5;
 
-// The validator doesn't know KHR_texture_basisu: the extension that allows image/ktx2.
+// The validator does not know KHR_texture_basisu, the extension that allows image/ktx2.
 const KTX2_WARNINGS = new Set(["VALUE_NOT_IN_LIST", "IMAGE_UNRECOGNIZED_FORMAT"]);
 const ERROR = 0;
 const WARNING = 1;
@@ -37,7 +37,7 @@ async function validate(bytes, what) {
     );
 }
 
-/** The same file with every bufferView in plain sight in one buffer. */
+/** Returns the same file with every bufferView uncompressed in one buffer. */
 function decompress(bytes) {
   const { document, binary } = unpackGlb(bytes);
   const parts = [];

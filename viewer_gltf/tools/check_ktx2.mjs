@@ -1,6 +1,6 @@
 /**
- * Read KTX2 textures by ktx-parse, .ktx2 files and those inside .glb files, and hold them against
- * the rules of KTX 2.0 and of KHR_texture_basisu that ktx-parse doesn't look at.
+ * Reads KTX2 textures with ktx-parse, from .ktx2 files and from .glb files, and checks the rules of KTX 2.0 and of
+ * KHR_texture_basisu that ktx-parse does not check.
  *
  * stdin: JSON array of paths. stdout: JSON array of {path, problems}, in the same order.
  */
@@ -56,7 +56,7 @@ function checkLevels(texture, problems) {
   });
 }
 
-/** `transfer`: the transfer function that a texture of a mesh must have; null: it is a volume. */
+/** Checks a texture; `transfer` is the transfer function that a mesh's texture must have, or null for a volume. */
 function checkTexture(bytes, transfer) {
   const problems = [];
   const texture = read(bytes);
@@ -81,7 +81,7 @@ function checkTexture(bytes, transfer) {
   return problems;
 }
 
-/** The images that glTF reads as sRGB; it takes normals and occlusion as they are. */
+/** Returns the images that glTF reads as sRGB; normals and occlusion are linear. */
 function imagesOfColor({ materials = [], textures = [] }) {
   const used = materials.flatMap(({ pbrMetallicRoughness = {}, emissiveTexture }) =>
     [pbrMetallicRoughness.baseColorTexture, emissiveTexture].filter(Boolean),

@@ -1,10 +1,10 @@
-/** Take a .glb apart and put one together (glTF 2.0, section 4). */
+/** Unpacks and packs .glb files (glTF 2.0, section 4). */
 
 const MAGIC = 0x46546c67;
 const JSON_CHUNK = 0x4e4f534a;
 const BIN_CHUNK = 0x004e4942;
 
-/** The document and the binary chunk (empty where there is none). Throws on a broken container. */
+/** Returns the document and the binary chunk, which is empty if there is none. Throws if the container is broken. */
 export function unpackGlb(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   if (bytes.byteLength < 20 || view.getUint32(0, true) !== MAGIC)
@@ -40,7 +40,7 @@ export function packGlb({ document, binary }) {
   return bytes;
 }
 
-/** The bytes of a bufferView that lies in the binary chunk. */
+/** Returns the bytes of a bufferView in the binary chunk. */
 export function bytesOf(view, binary) {
   const start = view.byteOffset ?? 0;
   if (start + view.byteLength > binary.length) throw new Error("a bufferView ends past the file");

@@ -1,4 +1,4 @@
-/** Loads what a layer adds to the specimen. Its code loads with the first bundle that has additions. */
+/** Loads additions, which a layer of the stage adds to the specimen. This code loads only for bundles with additions. */
 import { type Material, Mesh, type Object3D } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { BundleError } from "../bundle/errors";
@@ -12,7 +12,7 @@ export type LoadedAdditions = Readonly<{
   scene: Object3D;
   /** The meshes by the ID of their addition. */
   byId: ReadonlyMap<string, Object3D>;
-  /** The meshes that something behind them shows through. */
+  /** The translucent meshes. */
   translucent: readonly Object3D[];
   dispose: () => void;
 }>;

@@ -1,4 +1,4 @@
-/** This part shows arrows, labels, implants and electrodes that a layer over the stage adds to the specimen. */
+/** The part of the viewer that shows additions: arrows, labels, implants and electrodes from a layer over the stage. */
 import { Group } from "three";
 import { TemporaryError } from "../bundle/errors";
 import type { FileRef } from "../bundle/generated/bundle";

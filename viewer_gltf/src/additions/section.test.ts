@@ -12,7 +12,7 @@ const MANIFEST = {
 } as unknown as Manifest;
 
 describe("the section of additions", () => {
-  it("has a switch for each, by name and in the stage's order", () => {
+  it("has a named switch for each addition, in the stage's order", () => {
     const [{ items }] = additionSections(MANIFEST, { hiddenAdditions: ["/Specimen/Wire"] });
     const found = items.map((item) => item.kind === "toggle" && [item.label, item.value]);
     expect(found).toEqual([
@@ -21,7 +21,7 @@ describe("the section of additions", () => {
     ]);
   });
 
-  it("hides one beside those that are hidden, and shows one of all that are", () => {
+  it("hides one more addition, and shows one of several hidden ones", () => {
     const hiding = (hiddenAdditions: readonly string[], shown: boolean) => {
       const [{ items }] = additionSections(MANIFEST, { hiddenAdditions });
       const [first] = items;
@@ -32,7 +32,7 @@ describe("the section of additions", () => {
     expect(hiding([arrow, wire], true)).toEqual({ type: "hide-additions", hidden: [wire] });
   });
 
-  it("is not there where the stage adds nothing", () => {
+  it("does not exist if the stage has no additions", () => {
     expect(additionSections({} as Manifest, { hiddenAdditions: [] })).toEqual([]);
   });
 });

@@ -1,4 +1,4 @@
-/** The panel's section of what a layer adds to the specimen, and its key. Pure. */
+/** The panel's section for additions, which a layer of the stage adds to the specimen, and its key. Pure. */
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Control, PartSection } from "../panel/controls";
 import { type KeyGroup, key, no } from "../panel/key";

@@ -1,16 +1,16 @@
-/** Which additions of the stage are hidden. Pure. */
+/** The setting that lists the hidden additions of the stage. Pure. */
 import type { PartSettings } from "../state/part_settings";
 
 export const START_ADDITIONS = {
-  /** The IDs of all that the bundle has. */
+  /** The IDs of all additions of the bundle. */
   additions: [] as readonly string[],
-  /** The IDs of those that are hidden. */
+  /** The IDs of the hidden additions. */
   hiddenAdditions: [] as readonly string[],
 };
 
 export type AdditionSettings = Readonly<typeof START_ADDITIONS>;
 
-/** Hides these additions and shows all others. `all`: the IDs of all; absent: they are known. */
+/** Hides these additions and shows all others. `all` lists the IDs of all additions if they are not known yet. */
 export type HideAdditions = Readonly<{
   type: "hide-additions";
   hidden: readonly string[];

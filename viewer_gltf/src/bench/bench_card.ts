@@ -1,6 +1,6 @@
 /**
- * The benchmark's card over the picture (`?bench`): it asks for a tap, shows how far it is, and then the
- * table, the picture and the report to keep. `?bench=2` flies for two seconds a run.
+ * The benchmark's card over the view (`?bench`). It asks for a tap, shows the progress, and then the table, the chart
+ * and the report to save. With `?bench=2` each run takes two seconds.
  */
 import "./bench.css";
 import { element, setText } from "../dom/element";
@@ -14,7 +14,7 @@ export type BenchOptions = Readonly<{
   subject: Subject;
   /** The kinds of stereo that this device has. */
   stereo: readonly StereoKind[];
-  /** Must be called from a tap. Rejects where the browser or the user refuses. */
+  /** Must be called from a tap. Rejects if the browser or the user refuses. */
   startStereo: (kind: StereoKind) => Promise<void>;
   onReport: (report: Report) => void;
 }>;
@@ -54,7 +54,7 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
   });
   const start = async (kind: StereoKind | null) => {
     try {
-      // asked within the tap
+      // Stereo is requested within the tap, since browsers allow it only then.
       const begun = kind === null ? null : await startStereo(kind).then(() => kind, refused);
       const report = await runAll(subject, begun, flight_s, (step) => setText(told, words(step)));
       await subject.endStereo();

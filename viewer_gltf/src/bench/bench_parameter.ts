@@ -1,10 +1,10 @@
-/** What `?bench` in the page's address asks for. Pure. */
+/** Reads the parameter `bench` of the page's address. Pure. */
 
-/** Length of each run, s: without one in the address, and at most. */
+/** Length of a run if the address states none, and longest length, s. */
 const FLIGHT_S = 4;
 const LONGEST_S = 60;
 
-/** Whether an address asks for the benchmark, and how long its flights take, s. */
+/** Returns the length of the benchmark's flights, s, if an address asks for the benchmark; otherwise null. */
 export function flightAsked(search: string): number | null {
   const asked = new URLSearchParams(search).get("bench");
   if (asked === null) return null;

@@ -1,4 +1,4 @@
-/** The viewer as what the benchmark measures. */
+/** Adapts the viewer to the interface that the benchmark measures. */
 import { Vector3 } from "three";
 import type { PartHost } from "../host/part";
 import { XR_DISTANCE_M } from "../render/placement";
@@ -11,7 +11,7 @@ import type { BenchMode, Device } from "./report";
 import type { Subject } from "./runs";
 
 const MODES: Record<BenchMode, Mode> = { mesh: "off", disc: "disc", all: "all", traced: "traced" };
-/** The disc is open from wherever the specimen is flown. */
+/** Volume distance, m, at which the disc shows during the whole flight. */
 const ALWAYS_NEAR_M = 10;
 
 export function subjectOf(host: PartHost): Subject {
@@ -25,7 +25,7 @@ export function subjectOf(host: PartHost): Subject {
     edges: async () => {
       const [first] = volumeChannels(host.state);
       const sources = first && (await host.service("volumes")?.sourcesOf(first.id));
-      // of the tile with most voxels: those at a specimen's end have fewer
+      // The largest tile counts, since tiles at the specimen's edges have fewer voxels.
       const sizes = [...(sources?.values() ?? [])].map(({ volume }) =>
         volume.levels.map(({ size }) => Math.max(...size)),
       );
@@ -34,7 +34,7 @@ export function subjectOf(host: PartHost): Subject {
     },
     limit: (edge) => display.limitEdge(edge),
     show: (mode) => {
-      // a head at rest would choose a tile, and whole frames are compared
+      // Dwell is off, because a resting head would select a tile. High quality makes frames comparable.
       host.dispatch(setTo(DWELL, false));
       host.dispatch(setTo(QUALITY, "high"));
       host.dispatch(setTo(MODE, MODES[mode]));

@@ -1,4 +1,4 @@
-/** Frames a second over the volumes' size, a line for each mode, drawn on a canvas. */
+/** Draws a chart on a canvas: frames per second by the size of volumes, with a line for each mode. */
 import { type Line, linesOf, type Report } from "./report";
 
 const WIDTH = 960;
@@ -11,7 +11,7 @@ const EYES = { mono: "one picture", split: "split screen", headset: "headset" } 
 const INK = "#dfe3ee";
 const DIM = "#8b93a7";
 
-/** Where a display's rates lie. */
+/** Frame rates of displays, and lower ones, for the chart's axis. */
 const RATES = [1, 2, 5, 10, 15, 30, 60, 72, 90, 120, 240];
 
 export function drawChart(canvas: HTMLCanvasElement, report: Report): void {

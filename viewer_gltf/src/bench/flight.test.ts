@@ -7,7 +7,7 @@ const MIDDLE = [0, 0, 0] as const;
 const SHARES = Array.from({ length: 201 }, (_, i) => i / 200);
 
 describe("the flight", () => {
-  it("begins and ends where the specimen opens, the same side to the eyes", () => {
+  it("begins and ends at the specimen's first pose", () => {
     for (const share of [0, 1, -1, 2]) {
       const { position, orientation, scale } = poseAt(share, EYE, MIDDLE);
       expect(new Vector3(...position).length()).toBeCloseTo(0, 12);
@@ -16,7 +16,7 @@ describe("the flight", () => {
     }
   });
 
-  it("turns once round, without a jump, and comes near and goes again", () => {
+  it("turns the specimen once around without a jump, and moves it near and away again", () => {
     let turned = 0;
     let nearest = Number.POSITIVE_INFINITY;
     for (let i = 1; i < SHARES.length; i++) {

@@ -1,26 +1,28 @@
 /**
- * The way that a specimen takes before the eyes while frames are timed: once round, towards the eyes
- * and away again. The same in every run and on every device, by the share of its time. Pure.
+ * The specimen's flight while frames are timed: it turns once around, moves towards the eyes and away again. Its pose
+ * depends only on the share of the flight's time, so that all runs and devices show the same. Pure.
  */
 import type { Vec3 } from "../math/vec3";
 
-/** How far it comes towards the eyes, as a share of the way to them. */
+/** Largest movement towards the eyes, as a share of the distance to them. */
 const NEAREST_SHARE = 0.45;
-/** The most that it tips towards the eyes, rad. */
+/** Largest tilt towards the eyes, rad. */
 const TIP = 0.45;
 
 export type FlightPose = Readonly<{
-  /** The specimen's middle, m, in the room. */
+  /** The specimen's centre in the scene, m. */
   position: Vec3;
-  /** x, y, z, w */
+  /** Quaternion x, y, z, w. */
   orientation: readonly [number, number, number, number];
   scale: number;
 }>;
 
 /**
- * @param share 0..1 of the flight
- * @param eye where the eyes are, m
- * @param middle where the specimen's middle is at the start, m
+ * Returns the specimen's pose.
+ *
+ * @param share of the flight's time, 0..1
+ * @param eye place between the eyes, m
+ * @param middle the specimen's centre at the start, m
  */
 export function poseAt(share: number, eye: Vec3, middle: Vec3): FlightPose {
   const along = Math.min(1, Math.max(0, share));
@@ -31,7 +33,7 @@ export function poseAt(share: number, eye: Vec3, middle: Vec3): FlightPose {
   const [sinX, cosX] = [Math.sin(tip), Math.cos(tip)];
   return {
     position: [0, 1, 2].map((i) => middle[i] + near * (eye[i] - middle[i])) as unknown as Vec3,
-    // tipped after it was turned
+    // The specimen is first turned about y, then tilted about x.
     orientation: [sinX * cosY, cosX * sinY, sinX * sinY, cosX * cosY],
     scale: 1,
   };

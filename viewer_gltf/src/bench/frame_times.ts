@@ -1,16 +1,16 @@
-/** What a run's frames come to. Pure. */
+/** Summarises the times of a run's frames. Pure. */
 
 export type FrameTimes = Readonly<{
   frames: number;
-  /** Between two frames, ms. */
+  /** Median of the times between two frames, ms. */
   median_ms: number;
   p95_ms: number;
   longest_ms: number;
-  /** Frames a second, by the median. */
+  /** Frames per second by the median. */
   fps: number;
 }>;
 
-/** Of the times at which frames were drawn, ms, in order; null: fewer than two. */
+/** Summarises the times at which frames were drawn, ms, in ascending order; null if there are fewer than two frames. */
 export function summarise(drawnAt_ms: readonly number[]): FrameTimes | null {
   const between = drawnAt_ms.slice(1).map((time, i) => time - drawnAt_ms[i]);
   if (between.length === 0) return null;
@@ -25,14 +25,14 @@ export function summarise(drawnAt_ms: readonly number[]): FrameTimes | null {
   };
 }
 
-/** Between the two nearest, as numpy's default. */
+/** Returns a quantile by linear interpolation, like numpy's default. */
 function quantile(sorted: readonly number[], share: number): number {
   const at = share * (sorted.length - 1);
   const [low, high] = [Math.floor(at), Math.ceil(at)];
   return sorted[low] + (at - low) * (sorted[high] - sorted[low]);
 }
 
-/** Hundredths: no clock of a browser tells more. */
+/** Rounds to hundredths; the clocks of browsers are not more precise. */
 function rounded(value: number): number {
   return Math.round(100 * value) / 100;
 }

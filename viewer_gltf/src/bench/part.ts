@@ -1,4 +1,4 @@
-/** The benchmark as a part of the viewer. Its code loads where the address asks for it (`?bench`). */
+/** The benchmark as a part of the viewer. Its code loads only if the address asks for it (`?bench`). */
 import { pageAddress } from "../bundle/address";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { BenchResult } from "../host/services";

@@ -1,4 +1,4 @@
-/** The report of all runs, as it is saved. Nothing in it tells what the specimen is. Pure. */
+/** The report of all runs in the form that is saved. It contains nothing that identifies the specimen. Pure. */
 import type { FrameTimes } from "./frame_times";
 
 export const MODES = ["mesh", "disc", "all", "traced"] as const;
@@ -9,9 +9,9 @@ export type Run = FrameTimes &
   Readonly<{
     mode: BenchMode;
     eyes: Eyes;
-    /** Longest edge of a tile's volume as it was drawn, voxels; null: no volume shows in the mode. */
+    /** Longest edge of a tile's volume as it was drawn, voxels; null if the mode shows no volumes. */
     edge: number | null;
-    /** Of the frame with most of them. */
+    /** Largest number of draw calls of a frame. */
     drawCalls: number;
     triangles: number;
     /** Bytes of volumes on the GPU at the end. */
@@ -19,11 +19,11 @@ export type Run = FrameTimes &
   }>;
 
 export type Device = Readonly<{
-  /** The graphics driver's name, as far as the browser tells. */
+  /** The graphics driver's name, if the browser states it. */
   renderer: string;
   browser: string;
   cores: number;
-  /** Of the picture, device pixels. */
+  /** Width and height of the view, device pixels. */
   picture_px: readonly [number, number];
 }>;
 
@@ -31,9 +31,9 @@ export type Report = Readonly<{
   format: "stereocell-fps";
   version: 1;
   device: Device;
-  /** Of each flight, s. */
+  /** Length of each flight, s. */
   flight_s: number;
-  /** Most steps of a ray while the picture moves; pixels of the march to one of the picture. */
+  /** Largest number of steps of a ray while the view moves; `resolution`: marched pixels for each pixel of the view. */
   steps: number;
   resolution: number;
   tiles: number;
@@ -44,11 +44,11 @@ export type Report = Readonly<{
 export type Line = Readonly<{
   mode: BenchMode;
   eyes: Eyes;
-  /** By growing edge; a line of one point without: it holds for all. */
+  /** Points by ascending edge. The edge is null in a line of one point, which holds for all sizes of volumes. */
   points: readonly Readonly<{ edge: number | null; fps: number; median_ms: number }>[];
 }>;
 
-/** The runs by what they have in common, in the order in which they were made. */
+/** Groups the runs by mode and kind of stereo, in the order in which they were made. */
 export function linesOf(runs: readonly Run[]): readonly Line[] {
   const found = new Map<string, { line: Omit<Line, "points">; points: Run[] }>();
   for (const run of runs) {

@@ -1,48 +1,50 @@
-/** All runs of a benchmark, one after another: each mode in each kind of picture, by volume size. */
+/** Makes all runs of a benchmark one after another: each mode, with and without stereo, for each size of volumes. */
 import type { Vec3 } from "../math/vec3";
 import { type FlightPose, poseAt } from "./flight";
 import { summarise } from "./frame_times";
 import { type BenchMode, type Device, type Eyes, MODES, type Report, type Run } from "./report";
 
-/** What a run is done to. */
+/** The viewer that is measured. */
 export type Subject = Readonly<{
   device: Device;
   tiles: number;
   channels: number;
   canTrace: boolean;
-  /** Longest edges of a tile's volume at each of its mip levels, voxels, by size. */
+  /** Longest edges of a tile's volume at each of its mip levels, voxels, in ascending order. */
   edges: () => Promise<readonly number[]>;
-  /** Draw volumes of at most so many voxels along an edge, from now on. */
+  /** Limits volumes from now on to levels of at most `edge` voxels along an edge. */
   limit: (edge: number) => void;
   show: (mode: BenchMode) => void;
-  /** Resolves once all that is shown has come. */
+  /** Resolves once everything that is shown has loaded. */
   settled: () => Promise<void>;
-  /** Where the eyes are, and the middle of the specimen as it opens, m. */
+  /** Returns the place of the eyes, and the specimen's centre at the start of a flight, m. */
   stand: () => Readonly<{ eye: Vec3; middle: Vec3 }>;
   fly: (pose: FlightPose) => void;
   /** Resolves when the next frame has been drawn. */
   nextFrame: () => Promise<void>;
-  /** Of the frame before. */
+  /** Returns the cost of the previous frame. */
   cost: () => Readonly<{ drawCalls: number; triangles: number; volumeBytes: number }>;
   settings: () => Readonly<{ steps: number; resolution: number }>;
-  /** Back to one flat picture. */
+  /** Leaves stereo, so that the view is flat again. */
   endStereo: () => Promise<void>;
 }>;
 
-/** Volumes of fewer voxels along an edge are no volumes that anyone looks at. */
+/** Smallest edge of volumes that are measured, voxels; users do not look at smaller ones. */
 const MIN_EDGE = 32;
-/** Frames before those that count: shaders are compiled at the first. */
+/** Number of frames that are drawn before those that count, since the first one compiles shaders. */
 const WARM_UP_FRAMES = 3;
-/** Where frames take long, a flight takes so many nevertheless. */
+/** Smallest number of frames of a flight, even if frames take long. */
 const MIN_FRAMES = 6;
 
-/** What is announced before each run: which of how many, and what it is. */
+/** The announcement before each run: its number, the number of all runs, and its settings. */
 export type Step = Readonly<{ index: number; count: number; mode: BenchMode; eyes: Eyes }> &
   Readonly<{ edge: number | null }>;
 
 /**
- * @param stereo the kind that the viewer is in as the first run begins; null: no stereo is measured
- * @param flight_s of each run, s
+ * Makes all runs, and returns their report.
+ *
+ * @param stereo the kind of stereo that is on when the first run begins; null if stereo is not measured
+ * @param flight_s length of each run, s
  */
 export async function runAll(
   subject: Subject,
@@ -54,7 +56,7 @@ export async function runAll(
   const large = all.filter((edge) => edge >= MIN_EDGE);
   const edges = large.length > 0 ? large : all.slice(-1);
   const modes = MODES.filter((mode) => mode !== "traced" || subject.canTrace);
-  // a tap lets a page into stereo for a moment only: so stereo is first
+  // Stereo is measured first, since a page may start it only for a moment after a tap.
   const eyes: readonly Eyes[] = stereo === null ? ["mono"] : [stereo, "mono"];
   const steps = eyes.flatMap((each) =>
     modes.flatMap((mode) =>

@@ -35,7 +35,7 @@ describe("the source's address", () => {
     );
   });
 
-  it("is none where the page shows a bundle", () => {
+  it("is null if the page shows a bundle", () => {
     for (const page of ["https://host/", "https://host/?source=", "https://host/?bundle=x/"]) {
       expect(sourceAddress(page)).toBeNull();
     }
@@ -45,7 +45,7 @@ describe("the source's address", () => {
     ]);
   });
 
-  it("is an address of the web, and stands alone", () => {
+  it("is an address of the web, and can't be combined with a bundle", () => {
     for (const wrong of ["file:///etc/passwd", "http://", "javascript:alert(1)", "data:,x"]) {
       const page = `https://host/?source=${encodeURIComponent(wrong)}`;
       expect(() => sourceAddress(page)).toThrow("expected an image's address on the web");

@@ -1,10 +1,10 @@
 import { BundleError } from "./errors";
 
-/** A document without a web host (a notebook's frame, or a scene in one file) gives these to the page in it. */
+/** Addresses that a document without a web host (a notebook's frame, or a scene in one file) gives to its page. */
 type PageHost = Readonly<{
-  /** Replaces the page's address in a notebook's frame, which has none. The view stands behind its `#`. */
+  /** Replaces the page's address in a notebook's frame, which has none. The view comes after its `#`. */
   page?: string;
-  /** The bundle's folder, which the document itself answers for; absent: the bundle lies beside `page`. */
+  /** The bundle's folder, whose files the document itself contains; if absent, the bundle is beside `page`. */
   bundle?: string;
   /** The port to the notebook's widget. */
   port?: MessagePort;
@@ -14,24 +14,24 @@ declare global {
   var stereocellHost: PageHost | undefined;
 }
 
-/** Whether the page has an address in which a view can be kept. */
+/** Returns whether the page has an address that can contain a view. */
 export function hasAddress(): boolean {
   return globalThis.stereocellHost?.page === undefined;
 }
 
-/** The page's own address, or the one that a notebook gives it. */
+/** Returns the page's own address, or the one that a notebook gives it. */
 export function pageAddress(): string {
   return globalThis.stereocellHost?.page ?? location.href;
 }
 
-/** The address beside which the viewer's own files lie. A document that brings the bundle along brings those, too. */
+/** Returns the address beside which the viewer's files are. A document that contains the bundle contains them, too. */
 export function viewerAddress(): string {
   return globalThis.stereocellHost?.bundle ?? pageAddress();
 }
 
 /**
- * The address of a source that the page is to read by itself, which `?source=` names relative to the page or absolute;
- * null: the page shows a bundle. A document that brings its bundle along reads no source.
+ * Returns the address of a source that the page has to read by itself; null if the page shows a bundle. `?source=` names
+ * it, relative to the page or absolute. A document that contains its bundle reads no source.
  * Throws BundleError if it names no address of the web, or if the page is to show a bundle as well.
  */
 export function sourceAddress(page: string): string | null {
@@ -52,15 +52,14 @@ export function sourceAddress(page: string): string | null {
   return url.href;
 }
 
-/** Whether the address names a bundle, which may lie beside the page without a name. */
+/** Returns whether the address names a bundle; a page without this name may still have a bundle beside it. */
 export function namesBundle(page: string): boolean {
   return globalThis.stereocellHost !== undefined || new URL(page).searchParams.has("bundle");
 }
 
 /**
- * The folder that holds the bundle, with a closing slash. `?bundle=` names the folder or its
- * manifest.json, relative to the page or absolute; without it the bundle lies beside the page. A document that
- * brings its bundle along opens no other.
+ * Returns the folder of the bundle, with a closing slash. `?bundle=` names the folder or its manifest.json, relative to
+ * the page or absolute. Without it the bundle is beside the page. A document that contains its bundle opens no other.
  * Throws BundleError if it names no address of the web.
  */
 export function bundleAddress(page: string): string {

@@ -1,9 +1,9 @@
-/** Whether a host sends bricks by view. Pure. */
+/** Finds out whether a host sends the bricks of each view. Pure. */
 
-/** The server's word for it, on every answer; with the folder of a view that has bricks of its own. */
+/** Header by which the server reports this on every response, with the folder of a view that has its own bricks. */
 const HEADER = "Stereocell-Bricks";
 
-/** The websocket's address; null: the host has none. */
+/** Returns the websocket's address; null if the host has none. */
 export function bricksAddress(headers: Headers, base: string): string | null {
   const found = /^version=1(?:; folder=(g\d+\/))?$/.exec(headers.get(HEADER)?.trim() ?? "");
   if (found === null) return null;

@@ -1,6 +1,6 @@
 /**
- * Decompression, beside the frame: one worker, which is started when the first volume is wanted.
- * A texture holds one byte a channel: R8, RG8, or RGBA8 for three and four channels.
+ * Decompresses textures without blocking the page: in one worker, which starts with the first volume.
+ * A texture holds one byte for each channel: R8, RG8, or RGBA8 for three and four channels.
  */
 import { BundleError } from "./errors";
 
@@ -8,7 +8,7 @@ export type DecodeRequest = Readonly<{
   id: number;
   /** A zstd frame for each channel. */
   parts: readonly Uint8Array[];
-  /** Of each once decompressed. */
+  /** Size of each part after decompression, bytes. */
   bytes: number;
 }>;
 
@@ -16,11 +16,11 @@ export type DecodeAnswer = Readonly<{
   id: number;
   texels?: Uint8Array<ArrayBuffer>;
   fault?: string;
-  /** At fault. */
+  /** Index of the part that could not be decompressed. */
   part?: number;
 }>;
 
-/** A frame, and the name of what it belongs to, for messages. */
+/** A zstd frame, and its name in messages. */
 export type Frame = Readonly<{ bytes: Uint8Array; name: string }>;
 
 export class DecodeError extends BundleError {
@@ -49,12 +49,12 @@ function start(): Worker {
       resolve({ id, fault: event.message || "the worker can't be started" });
     }
     waiting.clear();
-    worker = null; // the next one may start
+    worker = null; // the next request tries to start another worker
   });
   return started;
 }
 
-/** The texels of all frames, interleaved. Throws DecodeError, which names the frame at fault. */
+/** Returns the texels of all frames, interleaved. Throws DecodeError, which names the frame at fault. */
 export async function decodeTexels(
   frames: readonly Frame[],
   bytes: number,

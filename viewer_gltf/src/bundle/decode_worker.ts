@@ -1,4 +1,4 @@
-/** In a worker: decompress the textures of up to four channels and put them side by side. */
+/** Decompresses and interleaves the textures of up to four channels, in a worker. */
 import { ZSTDDecoder } from "zstddec";
 import type { DecodeAnswer, DecodeRequest } from "./decode";
 
@@ -28,8 +28,8 @@ function unzstd(frame: Uint8Array, bytes: number, part: number): Uint8Array {
 async function decode({ parts, bytes }: DecodeRequest): Promise<Uint8Array<ArrayBuffer>> {
   await ready;
   const decoded = parts.map((part, i) => unzstd(part, bytes, i));
-  if (decoded.length === 1) return decoded[0] as Uint8Array<ArrayBuffer>; // a copy of its own
-  // three channels take four bytes: no texture format of three is drawn fast everywhere
+  if (decoded.length === 1) return decoded[0] as Uint8Array<ArrayBuffer>; // already a copy, which can be transferred
+  // Three channels take four bytes, since textures of three bytes are slow on some devices.
   const stride = decoded.length === 2 ? 2 : 4;
   const packed = new Uint8Array(bytes * stride);
   decoded.forEach((each, c) => {

@@ -1,4 +1,4 @@
-/** A fault of a bundle or of this browser, in words for the page. Other errors are bugs. */
+/** A fault of a bundle or of this browser, with a message for users. Other errors are bugs. */
 export class BundleError extends Error {
   override readonly name: string = "BundleError";
 }
@@ -8,7 +8,7 @@ export class MissingError extends BundleError {
   override readonly name = "MissingError";
 }
 
-/** A fault that may be gone a second later: no connection, or a host that is busy. */
+/** A fault that may pass: no connection, or a busy host. */
 export class TemporaryError extends BundleError {
   override readonly name = "TemporaryError";
   /** The page's notice, shown once for all files with the same fault. */

@@ -4,7 +4,7 @@ import { readBody, request } from "./fetch";
 
 const text = (response: Response) => response.text();
 
-/** A body that breaks after its first byte. */
+/** Returns a response whose body breaks after its first byte. */
 function broken(): Response {
   const body = new ReadableStream({
     pull(controller) {
@@ -32,7 +32,7 @@ describe("a request", () => {
     expect(fetched).toHaveBeenCalledTimes(2);
   });
 
-  it("that is no longer wanted is not tried again", async () => {
+  it("is not tried again after it was aborted", async () => {
     const stop = new AbortController();
     const fetched = vi.fn(async () => {
       stop.abort();
@@ -66,7 +66,7 @@ describe("a request", () => {
     }
   });
 
-  it("of a file that isn't there fails at once", async () => {
+  it("fails at once if the file does not exist", async () => {
     const fetched = vi.fn(async () => new Response("", { status: 404 }));
     vi.stubGlobal("fetch", fetched);
     await expect(request("https://host/a", "a")).rejects.toThrow("a: not found (404)");
@@ -74,7 +74,7 @@ describe("a request", () => {
   });
 });
 
-it("a body that breaks is a fault that may be gone a moment later", async () => {
+it("reports a body that breaks as a temporary fault", async () => {
   await expect(readBody(broken(), "a")).rejects.toThrow(TemporaryError);
   await expect(readBody(broken(), "a")).rejects.toThrow(
     "a: the connection broke before the file's end",

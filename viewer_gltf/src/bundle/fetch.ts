@@ -1,4 +1,4 @@
-/** Fetch files of a bundle, from a host or from the page itself. Every fault becomes a BundleError that names the file. */
+/** Fetches files of a bundle from a host or from the page itself. Each fault is a BundleError that names the file. */
 import { BundleError, MissingError, TemporaryError } from "./errors";
 import type { FileRef } from "./generated/bundle";
 import { checkHash } from "./hash";
@@ -6,23 +6,22 @@ import { heldResponse, isHeld } from "./held_files";
 import { noteAsked } from "./request_log";
 import { withRetries } from "./retry";
 
-/** The address of a path that a manifest names; the bundle's query, if any, goes with it. */
+/** Returns the address of a path in a manifest, including the query of the bundle's address, if any. */
 export function fileAddress(base: string, path: string): string {
   const url = new URL(base);
   return new URL(path + url.search, base).href;
 }
 
-/** HTTP status of an answer to a range. */
+/** HTTP status of a response with a part of a file. */
 const PART = 206;
 
-/** Answers of a host that may be better a moment later. */
+/** HTTP statuses of faults that may pass: this one, and all from the next one up. */
 const BUSY = 429;
 const FIRST_SERVER_FAULT = 500;
 
 /**
- * The response of `url`, if its status says success, with all of its body here already. `path` is
- * the file's name in messages. Faults of the network and of the host, also in the middle of the
- * body, are tried again before they are thrown.
+ * Returns the response of `url` after its whole body has arrived. `path` is the file's name in messages. After a
+ * temporary fault of the network or the host, also within the body, the request is repeated; the last fault is thrown.
  */
 export function request(url: string, path: string, options: RequestInit = {}): Promise<Response> {
   noteAsked(url, options.headers);
@@ -36,7 +35,7 @@ export function request(url: string, path: string, options: RequestInit = {}): P
   return withRetries(whole, options.signal);
 }
 
-/** `fault`: of the host. One notice is enough for all files that it does not bring. */
+/** Returns the notice for a host's fault; it names no file, so that one notice serves for all missing files. */
 function noticeOf(url: string, fault: string): string {
   return `The host ${new URL(url).host} ${fault}: not all files have come.`;
 }
@@ -63,13 +62,13 @@ async function requestOnce(url: string, path: string, options: RequestInit): Pro
   return response;
 }
 
-/** The response's bytes. Throws TemporaryError if the connection breaks before the last one. */
+/** Returns the response's bytes. Throws TemporaryError if the connection breaks before the last one. */
 export async function readBody(response: Response, path: string): Promise<Uint8Array<ArrayBuffer>> {
   try {
     return new Uint8Array(await response.arrayBuffer());
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    const { url } = response; // "" for one that was made here
+    const { url } = response; // "" for a response that the page itself has made
     throw new TemporaryError(`${path}: the connection broke before the file's end`, {
       cause: error,
       notice: url === "" ? undefined : noticeOf(url, "breaks the connection off"),
@@ -77,7 +76,7 @@ export async function readBody(response: Response, path: string): Promise<Uint8A
   }
 }
 
-/** The file's bytes, after their number and hash were checked against the reference. */
+/** Returns the file's bytes after it has checked their number and hash. Throws BundleError. */
 export async function fetchFile(
   base: string,
   file: FileRef,
@@ -93,10 +92,10 @@ export async function fetchFile(
 export type FilePart = Readonly<{ offset: number; length: number; sha256: string }>;
 
 /**
- * A checked part of a file, or the whole file, checked, if the host sends no parts. What was spoilt
- * on its way may lie in a cache since: it is asked for once more, past all caches.
+ * Returns a checked part of a file, or the whole checked file if the host does not send parts. A part with a wrong hash
+ * is requested a second time without caches, since a cache may contain a damaged copy.
  *
- * @param name what the part is, in messages
+ * @param name the part's name in messages
  */
 export async function fetchPart(
   base: string,
@@ -131,7 +130,7 @@ export async function fetchPart(
   return { bytes, isWhole: false };
 }
 
-/** Throws BundleError unless the bytes are the ones that the reference describes. */
+/** Throws BundleError unless number and hash of the bytes agree with the reference. */
 export async function checkFile(file: FileRef, bytes: Uint8Array<ArrayBuffer>): Promise<void> {
   if (bytes.length !== file.bytes) {
     throw new BundleError(
@@ -141,7 +140,7 @@ export async function checkFile(file: FileRef, bytes: Uint8Array<ArrayBuffer>): 
   await checkHash(file.path, bytes, file.sha256);
 }
 
-/** The parsed text. Throws BundleError if it is no JSON, as a host's own error page, or cut short. */
+/** Returns the parsed text. Throws BundleError if it is not JSON (perhaps a host's error page), or is cut short. */
 export function parseJson(text: string, path: string): unknown {
   try {
     return JSON.parse(text);

@@ -3,7 +3,7 @@ import { BundleError } from "./errors";
 import { checkHash, SHA_256_128 } from "./hash";
 
 const ABC = new TextEncoder().encode("abc");
-/** FIPS 180-4's own example. */
+/** SHA-256 of "abc", the example of FIPS 180-4. */
 const HASH = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
 const SHORT = "ungWv48Bz-pBQUDeXa4iIw";
 
@@ -11,12 +11,12 @@ describe("a hash", () => {
   beforeEach(() => void vi.stubGlobal("isSecureContext", true));
   afterEach(() => vi.unstubAllGlobals());
 
-  it("of the right bytes passes, in either form", async () => {
+  it("passes for the right bytes, in both forms", async () => {
     await checkHash("a.glb", ABC, HASH);
     await checkHash("a.glb", ABC, SHORT, SHA_256_128);
   });
 
-  it("of other bytes is reported with the expected and the found one", async () => {
+  it("is reported with the expected and the found one if the bytes differ", async () => {
     const other = HASH.replace("b", "c");
     const wrong = checkHash("a.ktx2: level 2", ABC, other);
     await expect(wrong).rejects.toThrow(
@@ -27,7 +27,7 @@ describe("a hash", () => {
     );
   });
 
-  it("can't be had outside a secure context", async () => {
+  it("can't be computed outside a secure context", async () => {
     vi.stubGlobal("isSecureContext", false);
     await checkHash("a.glb", ABC, "another");
   });

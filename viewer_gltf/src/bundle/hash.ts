@@ -1,16 +1,16 @@
-/** Hold bytes against the hash that a bundle gives of them. */
+/** Compares bytes with their hash in a bundle. */
 import { BundleError } from "./errors";
 
 /** How a hash is written down. */
 export type HashForm = Readonly<{ name: string; write: (digest: Uint8Array) => string }>;
 
-/** As the manifest and the lists of volumes have it: lower-case hexadecimal. */
+/** The form in the manifest and the lists of volumes: lower-case hexadecimal. */
 const SHA_256: HashForm = {
   name: "SHA-256",
   write: (digest) => Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join(""),
 };
 
-/** As tilesets have it, under this name: its first 128 bits in base64url (RFC 6920). */
+/** The form in tilesets, with its name there: the first 128 bits in base64url (RFC 6920). */
 export const SHA_256_128: HashForm = {
   name: "sha-256-128",
   write: (digest) =>
@@ -21,8 +21,8 @@ export const SHA_256_128: HashForm = {
 };
 
 /**
- * Throws BundleError, which begins with `what`, unless the bytes have this hash. That takes a secure
- * context (https or localhost); elsewhere the size, which callers check first, has to do.
+ * Throws BundleError, whose message begins with `what`, unless the bytes have this hash. Outside a secure context
+ * (https or localhost) it checks nothing; callers check the size first.
  */
 export async function checkHash(
   what: string,

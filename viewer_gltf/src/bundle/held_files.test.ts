@@ -10,18 +10,18 @@ describe("files that the page holds", () => {
   const base = holdFiles(new Map([["channels/a/x.bin", bytes]]));
   const file = { path: "channels/a/x.bin", bytes: 4, sha256: SHA_256 };
 
-  it("are read as those of a host", async () => {
+  it("are read like those of a host", async () => {
     expect(isHeld(base)).toBe(true);
     expect(isHeld("https://host/")).toBe(false);
     expect(await fetchFile(base, file)).toEqual(bytes);
   });
 
-  it("are given whole where a part is asked for", async () => {
+  it("are returned whole if a part is requested", async () => {
     const part = { offset: 0, length: 2, sha256: "" };
     expect(await fetchPart(base, file, part, "level 0")).toEqual({ bytes, isWhole: true });
   });
 
-  it("are apart for each set of files", async () => {
+  it("are separate for each set of files", async () => {
     const other = holdFiles(new Map());
     expect(other).not.toBe(base);
     await expect(fetchFile(other, file)).rejects.toThrow(BundleError);

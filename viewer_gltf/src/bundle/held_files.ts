@@ -1,12 +1,12 @@
 /**
- * Files of a bundle that the page itself holds: it has made them of a source, and no host has them. All that reads a
- * bundle asks for them by their address, as for files of a host.
+ * Files of a bundle that the page has made from a source and holds in memory. All code that reads a bundle requests them
+ * by their address, like files of a host.
  */
 
-/** The contents of files by their paths. */
+/** Contents of files by their paths. */
 export type HeldFiles = ReadonlyMap<string, Uint8Array<ArrayBuffer>>;
 
-/** A scheme that no browser fetches: an address that is asked for past the page fails, and leaves the machine alone. */
+/** A scheme that no browser can fetch: a request that bypasses this module fails without using the network. */
 const SCHEME = "held:";
 
 const folders = new Map<string, HeldFiles>();
@@ -19,12 +19,12 @@ export function holdFiles(files: HeldFiles): string {
   return base;
 }
 
-/** Lets go of the files of a folder; what has been read stays valid. */
+/** Releases the files of a folder. Contents that have been read stay valid. */
 export function releaseFiles(base: string): void {
   folders.delete(base);
 }
 
-/** Whether an address is that of held files, or of their folder. */
+/** Returns whether an address belongs to held files, or to their folder. */
 export function isHeld(address: string): boolean {
   return address.startsWith(SCHEME);
 }

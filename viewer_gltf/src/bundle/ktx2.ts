@@ -1,4 +1,4 @@
-/** Whole KTX2 textures: their format and size are checked, their levels decompressed. */
+/** Reads whole KTX2 textures: checks format and size, and decompresses levels. */
 import {
   KHR_SUPERCOMPRESSION_NONE,
   KHR_SUPERCOMPRESSION_ZSTD,
@@ -13,14 +13,14 @@ import { BundleError } from "./errors";
 
 export type Size3 = readonly [number, number, number];
 
-/** Bytes a texel of each format that a bundle uses; the key names it in messages. */
+/** Bytes per texel of each format that a bundle uses; the keys are the names in messages. */
 export const FORMATS = {
   R8: { vk: VK_FORMAT_R8_UNORM, bytes: 1 },
   R8G8: { vk: VK_FORMAT_R8G8_UNORM, bytes: 2 },
   R8G8B8A8: { vk: VK_FORMAT_R8G8B8A8_UNORM, bytes: 4 },
 } as const;
 
-/** The parsed container. Throws BundleError unless format and level-0 size are as expected. */
+/** Returns the parsed container. Throws BundleError unless format and size of level 0 are as expected. */
 export function readTexture(
   file: Uint8Array<ArrayBuffer>,
   path: string,
@@ -47,7 +47,7 @@ export function readTexture(
   return texture;
 }
 
-/** The texels of one level, x fastest. Throws BundleError. */
+/** Returns the texels of one level, x fastest. Throws BundleError. */
 export async function readLevel(
   texture: KTX2Container,
   path: string,
@@ -83,7 +83,7 @@ export async function readLevel(
   }
 }
 
-/** The zstd frame of one level; of an uncompressed texture, null. Throws BundleError. */
+/** Returns the zstd frame of one level; null if the texture is not compressed. Throws BundleError. */
 export function compressedLevel(
   texture: KTX2Container,
   path: string,

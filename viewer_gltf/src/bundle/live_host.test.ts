@@ -18,7 +18,7 @@ it("finds the websocket beside a bundle in a folder", () => {
   );
 });
 
-it("takes no other word for one", () => {
+it("ignores other values of the header", () => {
   expect(of(null)).toBeNull();
   for (const value of [
     "version=2; folder=",

@@ -1,12 +1,12 @@
-/** Whether a source is being built behind the bundle, which is a view of it. Pure. */
+/** Finds out whether the bundle is a view of a source that the server is building. Pure. */
 
-/** The server's word for it, with the folder of the newest view, on the manifest. */
+/** Header of the manifest by which the server reports a build, with the folder of the newest view. */
 const HEADER = "Stereocell-Live";
 
 /** A build that can be watched: its websocket, and the folder of its newest view. */
 export type LiveHost = Readonly<{ socket: string; folder: string }>;
 
-/** Returns what the answer to a manifest says of a build behind it; null: there is none. */
+/** Returns the build that the headers of a manifest name; null if there is none. */
 export function liveHost(headers: Headers, base: string): LiveHost | null {
   const found = /^version=1; folder=((?:g\d+\/)?)$/.exec(headers.get(HEADER)?.trim() ?? "");
   if (found === null) return null;

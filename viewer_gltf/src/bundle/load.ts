@@ -1,4 +1,4 @@
-/** Load the small files of a bundle: the manifest, a channel's list of volumes and what it has in 2D. */
+/** Loads the small files of a bundle: the manifest, and a channel's list of volumes, 2D functions and histogram. */
 
 import { bricksAddress } from "./brick_host";
 import { fetchFile, fileAddress, parseJson, readBody, request } from "./fetch";
@@ -14,15 +14,15 @@ import { valuesAddress } from "./values_host";
 export type Bundle = Readonly<{
   base: string;
   manifest: Manifest;
-  /** Address of the websocket that sends bricks by view; absent: volumes come as files. */
+  /** Address of the websocket that sends the bricks of each view; if absent, volumes are files. */
   bricks?: string;
-  /** Address of the values as measured; absent: the host has none. */
+  /** Address of the measured values; absent if the host has none. */
   values?: string;
-  /** The build behind this view of a source; absent: there is none, and the bundle is whole. */
+  /** The build whose view of a source this is; absent if the bundle is complete. */
   live?: LiveHost;
 }>;
 
-/** Load and check the bundle in the folder `base`. Throws BundleError. */
+/** Loads and checks the bundle in the folder `base`. Throws BundleError. */
 export async function loadBundle(base: string): Promise<Bundle> {
   const path = "manifest.json";
   const response = await request(fileAddress(base, path), path, { cache: "no-cache" });
@@ -40,7 +40,7 @@ export async function loadBundle(base: string): Promise<Bundle> {
   };
 }
 
-/** The volumes of one channel, by tile. Throws BundleError. */
+/** Loads the list of a channel's volumes, by tile. Throws BundleError. */
 export async function loadVolumes(
   base: string,
   file: FileRef,
@@ -50,13 +50,13 @@ export async function loadVolumes(
   return new Map(volumes.map((volume) => [volume.tile, volume]));
 }
 
-/** The two-dimensional transfer functions of one channel. Throws BundleError. */
+/** Loads the two-dimensional transfer functions of one channel. Throws BundleError. */
 export async function loadTransfer2d(base: string, file: FileRef): Promise<ChannelTransfer2D> {
   const text = new TextDecoder().decode(await fetchFile(base, file));
   return checkTransfer2d(parseJson(text, file.path), file.path);
 }
 
-/** A histogram of value and gradient, COLUMNS x ROWS bytes, row 0 first. Throws BundleError. */
+/** Loads a histogram of value and gradient, COLUMNS x ROWS bytes, row 0 first. Throws BundleError. */
 export async function loadHistogram(base: string, file: FileRef): Promise<Uint8Array> {
   const bytes = await fetchFile(base, file);
   const texture = readTexture(bytes, file.path, "R8", [COLUMNS, ROWS, 1]);

@@ -1,7 +1,7 @@
 import { expect, it, vi } from "vitest";
 
-it("notes each address and range once, and whether its answer has come", async () => {
-  vi.resetModules(); // other tests of this process have requests of their own
+it("logs each address and range once, and whether it was answered", async () => {
+  vi.resetModules(); // other tests of this process have added to the log
   const { noteAsked, allAsked, allCome } = await import("./request_log");
   noteAsked("https://host/a", undefined);
   noteAsked("https://host/a", { Range: "bytes=0-9" });

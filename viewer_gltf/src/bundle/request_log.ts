@@ -1,9 +1,9 @@
-/** The requests to the bundle's host so far: those that a service worker has not seen, and those that it should have kept. */
+/** Logs the requests to the bundle's host, for a service worker that keeps files which were loaded before it started. */
 
-/** `range`: the Range header. */
+/** A request; `range` is its Range header. */
 export type Asked = Readonly<{ url: string; range: string | null }>;
 
-/** The requests by address and range, and whether each has been answered. */
+/** Requests by address and range, and whether each has been answered. */
 const log = new Map<string, Readonly<{ asked: Asked; hasCome: boolean }>>();
 
 export const keyOf = ({ url, range }: Asked) => `${url} ${range}`;
@@ -18,7 +18,7 @@ export function allAsked(): readonly Asked[] {
   return [...log.values()].map(({ asked }) => asked);
 }
 
-/** Addresses of the files that the host has answered. */
+/** Returns the requests that the host has answered. */
 export function allCome(): readonly Asked[] {
   return [...log.values()].filter(({ hasCome }) => hasCome).map(({ asked }) => asked);
 }

@@ -22,12 +22,12 @@ describe("a job that may be tried again", () => {
     await expect(withRetries(job, null, [0, 0])).rejects.toThrow("busy");
   });
 
-  it("fails at once where another try can't help", async () => {
+  it("fails at once if another try can't help", async () => {
     const job = failing(1, new BundleError("not found"));
     await expect(withRetries(job, null, [0, 0])).rejects.toThrow("not found");
   });
 
-  it("is reported as waiting, and as done once none waits", async () => {
+  it("is reported as waiting, and the end of waiting is reported once no job waits", async () => {
     const reported: number[] = [];
     watchWaiting((jobs) => reported.push(jobs));
     const jobs = [1, 2, 3].map((n) => failing(n, new TemporaryError("busy")));
@@ -39,14 +39,14 @@ describe("a job that may be tried again", () => {
     expect(reported).toHaveLength(6);
   });
 
-  it("stops at once when it is no longer wanted while it rests", async () => {
+  it("stops at once if it is aborted during a pause", async () => {
     const stop = new AbortController();
     const waiting = withRetries(failing(1, new TemporaryError("busy")), stop.signal, [60_000]);
     setTimeout(() => stop.abort(), 5);
     await expect(waiting).rejects.toThrow(/abort/i);
   });
 
-  it("stops when it is no longer wanted", async () => {
+  it("stops if it is aborted", async () => {
     const job = failing(1, new TemporaryError("busy"));
     await expect(withRetries(job, AbortSignal.abort(), [0])).rejects.toThrow(/abort/i);
   });

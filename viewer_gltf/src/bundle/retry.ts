@@ -1,12 +1,12 @@
-/** Try again what may succeed a moment later, and report meanwhile that the network is awaited. */
+/** Repeats jobs after temporary faults, and reports while a job waits for its next try. */
 import { TemporaryError } from "./errors";
 
-/** Pauses before the second, third and fourth try, ms. */
+/** Pauses before the second, third and fourth try of a job, ms. */
 const PAUSES_MS: readonly number[] = [300, 1200, 4000];
-/** Longest wait for a network at each pause, ms, on a device that knows that it has none. */
+/** Longest pause, ms, while the browser reports that the device is offline. */
 const OFFLINE_MS = 30_000;
 
-/** Called with the number of jobs that wait for another try: when one more begins to wait, and when none does. */
+/** Called with the number of waiting jobs, whenever a job begins to wait and when no job waits any more. */
 export type WaitListener = (jobs: number) => void;
 
 let listener: WaitListener = () => undefined;
@@ -21,12 +21,12 @@ function count(change: 1 | -1): void {
   if (change === 1 || waiting === 0) listener(waiting);
 }
 
-/** Reports that a connection is awaited besides, or no longer. */
+/** Counts a connection that waits for its next try outside of `withRetries`, or has stopped waiting. */
 export function noteWait(isWaiting: boolean): void {
   count(isWaiting ? 1 : -1);
 }
 
-/** The pause, or less where the network comes back or the job is no longer wanted. */
+/** Waits for a pause; less if the network comes back or the job is aborted. */
 function rest(pause_ms: number, signal: AbortSignal | null | undefined): Promise<void> {
   const isOffline = globalThis.navigator?.onLine === false;
   return new Promise((resolve) => {
@@ -42,7 +42,7 @@ function rest(pause_ms: number, signal: AbortSignal | null | undefined): Promise
   });
 }
 
-/** The job's result. A TemporaryError is thrown only once the pauses are used up. */
+/** Returns the job's result, and repeats the job after a TemporaryError. Throws the error of the last try. */
 export async function withRetries<T>(
   job: () => Promise<T>,
   signal?: AbortSignal | null,

@@ -39,7 +39,7 @@ describe("the manifest's check", () => {
     expect(checkManifest(MANIFEST)).toBe(MANIFEST);
   });
 
-  it("reports another format and another version, found against expected", () => {
+  it("reports a wrong format and a wrong version with the found and the expected value", () => {
     expect(() => checkManifest({ ...MANIFEST, format: "tileset" })).toThrow(
       'manifest.json: format: expected "stereocell-bundle", found "tileset"',
     );
@@ -59,7 +59,7 @@ describe("the manifest's check", () => {
     expect(() => checkManifest(rest)).toThrow(/^manifest\.json: .*"tiles"/);
   });
 
-  it("refuses a bundle without channels, in one line", () => {
+  it("refuses a bundle without channels with a message of one line", () => {
     expect(() => checkManifest({ ...MANIFEST, channels: [] })).toThrow(
       /^manifest\.json: channels: the bundle holds none, so nothing can be shown$/,
     );
@@ -72,19 +72,19 @@ describe("the manifest's check", () => {
 });
 
 describe("other JSON", () => {
-  it("of volumes is checked by its own schema", () => {
+  it("is checked by its own schema, for volumes", () => {
     expect(() => checkVolumes({ volumes: [{ tile: "r0_c0" }] }, "channels/A/volumes.json")).toThrow(
       /^channels\/A\/volumes\.json: volumes\.0: /,
     );
   });
 
-  it("that is a host's error page is reported as such", () => {
+  it("is reported as such if it is a host's error page", () => {
     expect(() => parseJson("<!doctype html><title>Oops</title>", "manifest.json")).toThrow(
       'manifest.json: expected JSON, found "<!doctype html>',
     );
   });
 
-  it("that is cut short is reported as such", () => {
+  it("is reported as such if it is cut short", () => {
     const text = JSON.stringify(MANIFEST).slice(0, 200);
     expect(() => parseJson(text, "manifest.json")).toThrow(
       /^manifest\.json: the JSON is broken or cut short \(/,

@@ -1,4 +1,4 @@
-/** Check a bundle's JSON files against the schemas that the pipeline wrote them by. */
+/** Checks a bundle's JSON files by the schemas that the pipeline uses to write them. */
 import { type OutputUnit, type Schema, Validator } from "@cfworker/json-schema";
 import bundleSchema from "../../../schemas/bundle.schema.json";
 import transfer2dSchema from "../../../schemas/transfer2d.schema.json";
@@ -15,7 +15,7 @@ const VERSION = 1;
 export function checkSchema(schema: object, value: unknown, path: string): void {
   const result = new Validator(schema as Schema, "2020-12", true).validate(value);
   if (result.valid) return;
-  // The innermost error is the most exact; after a wrong tuple the validator adds a bare "false".
+  // The innermost error is the most specific. After a wrong tuple the validator adds an error without details, "false".
   const depth = (unit: OutputUnit) => unit.instanceLocation.split("/").length;
   const specific = result.errors.filter((unit) => unit.keyword !== "false");
   const { instanceLocation, error } = (specific.length > 0 ? specific : result.errors).reduce(
@@ -30,7 +30,7 @@ function fieldOf(value: unknown, key: string): unknown {
   return (value as Record<string, unknown>)[key];
 }
 
-/** The manifest, once format, version and shape are right. Throws BundleError. */
+/** Checks format, version and schema of a manifest, and returns it. Throws BundleError. */
 export function checkManifest(value: unknown): Manifest {
   const format = fieldOf(value, "format");
   if (format !== FORMAT) {
@@ -55,13 +55,13 @@ export function checkManifest(value: unknown): Manifest {
   return manifest;
 }
 
-/** A channel's volumes.json, once its shape is right. Throws BundleError. */
+/** Checks a channel's volumes.json by its schema, and returns it. Throws BundleError. */
 export function checkVolumes(value: unknown, path: string): ChannelVolumes {
   checkSchema(volumesSchema, value, path);
   return value as ChannelVolumes;
 }
 
-/** A channel's transfer2d.json, once its shape is right and its shapes are. Throws BundleError. */
+/** Checks a channel's transfer2d.json by its schema, and each of its shapes, and returns it. Throws BundleError. */
 export function checkTransfer2d(value: unknown, path: string): ChannelTransfer2D {
   checkSchema(transfer2dSchema, value, path);
   const checked = value as ChannelTransfer2D;

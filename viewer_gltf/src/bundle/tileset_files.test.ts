@@ -4,7 +4,7 @@ import { checkGlb, checkTileset, contentHashes, TilesetFiles } from "./tileset_f
 
 const PATH = "channels/A/r0_c0/lod0.glb";
 
-/** The header holds `length`; the file has `found` bytes. */
+/** A glb file of `found` bytes whose header states `length`. */
 function glb(length: number, found: number): Uint8Array {
   const bytes = new Uint8Array(found);
   const view = new DataView(bytes.buffer);
@@ -15,12 +15,12 @@ function glb(length: number, found: number): Uint8Array {
 }
 
 describe("a surface's file", () => {
-  it("is as long as in its header", () => {
+  it("has the length that its header states", () => {
     expect(() => checkGlb(glb(40, 40), PATH)).not.toThrow();
     expect(() => checkGlb(glb(40, 28), PATH)).toThrow(`${PATH}: expected 40 bytes, found 28`);
   });
 
-  it("is no host's page", () => {
+  it("is not a host's error page", () => {
     const page = new TextEncoder().encode("<!doctype html><title>Oops</title>");
     expect(() => checkGlb(page, PATH)).toThrow(`${PATH}: expected a glb surface`);
     expect(() => checkGlb(new Uint8Array(), PATH)).toThrow(`${PATH}: expected a glb surface`);
@@ -45,7 +45,7 @@ describe("a tileset", () => {
     }
   });
 
-  it("may have no children, as an external one of a single surface", () => {
+  it("may have no children, like an external one of a single surface", () => {
     const tileset = { asset: { version: "1.1" }, root: { content: { uri: "lod0.glb" } } };
     expect(checkTileset(tileset, "finer.json")).toBe(tileset);
   });
@@ -56,7 +56,7 @@ describe("the hashes of a tileset", () => {
   const tileset = (root: object) => checkTileset({ asset: { version: "1.1" }, root }, "t.json");
   const address = "https://host/b/channels/A/tileset.json";
 
-  it("are those of all levels, by the surfaces' addresses", () => {
+  it("are collected from all levels, by the surfaces' addresses", () => {
     const finer = { content: content("r0_c0/lod0.glb", "fine") };
     const coarse = { content: content("r0_c0/lod1.glb", "coarse"), children: [finer] };
     expect([...contentHashes(tileset({ children: [coarse] }), "t.json", address)]).toEqual([
@@ -65,7 +65,7 @@ describe("the hashes of a tileset", () => {
     ]);
   });
 
-  it("are all there", () => {
+  it("are required for all files", () => {
     const bare = { content: { uri: "r0_c0/lod0.glb" } };
     expect(() => contentHashes(tileset({ children: [bare] }), "t.json", address)).toThrow(
       "t.json: r0_c0/lod0.glb has no hash, expected extras.sha-256-128",
@@ -87,7 +87,7 @@ describe("the files of a tileset", () => {
   const bytesOf = (root: object) =>
     Buffer.from(JSON.stringify({ asset: { version: "1.1" }, geometricError: 1, root }));
 
-  /** A coarsest surface with finer ones in an external tileset; a host that serves `files`. */
+  /** Serves a coarsest surface with finer ones in an external tileset, with some files replaced by `changed`. */
   function serve(changed: Readonly<Record<string, Uint8Array>> = {}) {
     const finer = bytesOf(tile("lod0.glb", surface));
     const holder = tile("r0_c0/finer.json", finer);
@@ -113,7 +113,7 @@ describe("the files of a tileset", () => {
     return { files: new TilesetFiles(BASE, ref), asked };
   }
 
-  it("come by way of external tilesets, with the bundle's query", async () => {
+  it("are found through external tilesets, with the bundle's query", async () => {
     const { files, asked } = serve();
     expect(files.root).toBe(`${FOLDER}/tileset.json`);
     for (const path of ["tileset.json", "r0_c0/finer.json"]) {
@@ -129,7 +129,7 @@ describe("the files of a tileset", () => {
     ]);
   });
 
-  it("come as new objects each time, since the renderer takes them apart", async () => {
+  it("are new objects each time, since the renderer changes them", async () => {
     const { files } = serve();
     await files.fetch(files.root);
     const [one, other] = [1, 2].map(() => files.fetch(`${FOLDER}/r0_c0/finer.json`));
@@ -137,14 +137,14 @@ describe("the files of a tileset", () => {
     expect(await one).not.toBe(await other);
   });
 
-  it("are unknown before the tileset that names them has come", async () => {
+  it("are unknown before the tileset that names them was read", async () => {
     const { files } = serve();
     await files.fetch(files.root);
     const address = `${FOLDER}/r0_c0/lod0.glb`;
     await expect(files.fetch(address)).rejects.toThrow("is not in its tileset");
   });
 
-  it("are refused where an external tileset is not the one that was named", async () => {
+  it("are refused if an external tileset has another hash", async () => {
     const changed = bytesOf(tile("lod0.glb", new Uint8Array(1)));
     const { files } = serve({ "r0_c0/finer.json": changed });
     await files.fetch(files.root);
@@ -155,7 +155,7 @@ describe("the files of a tileset", () => {
     await expect(files.fetch(address)).rejects.toThrow("is not in its tileset");
   });
 
-  it("are refused in words where a host's page comes in place of an external tileset", async () => {
+  it("are refused with a clear message if a host's error page replaces an external tileset", async () => {
     const { files } = serve({ "r0_c0/finer.json": Buffer.from("<!doctype html>") });
     await files.fetch(files.root);
     await expect(files.fetch(`${FOLDER}/r0_c0/finer.json`)).rejects.toThrow(

@@ -1,4 +1,4 @@
-/** Fetch and check what a tileset is made of: its JSON, external ones too, and its glb files. */
+/** Fetches and checks the files of a tileset: its JSON, external tilesets, and glb files. */
 import { BundleError } from "./errors";
 import { fetchFile, fileAddress, parseJson, readBody, request } from "./fetch";
 import type { FileRef } from "./generated/bundle";
@@ -8,7 +8,7 @@ import { checkHash, SHA_256_128 } from "./hash";
 const HEADER_BYTES = 12;
 const MAGIC = 0x46546c67;
 
-/** Throws BundleError unless the bytes are a whole glb by their own header. */
+/** Throws BundleError unless the bytes are a whole glb file according to its header. */
 export function checkGlb(bytes: Uint8Array, path: string): void {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   if (bytes.length < HEADER_BYTES || view.getUint32(0, true) !== MAGIC) {
@@ -22,7 +22,7 @@ export function checkGlb(bytes: Uint8Array, path: string): void {
   }
 }
 
-/** The bytes of a surface; its tileset gave `hash`. Throws BundleError, or AbortError. */
+/** Returns the bytes of a surface, whose `hash` is in its tileset. Throws BundleError, or AbortError. */
 async function fetchGlb(
   base: string,
   path: string,
@@ -31,7 +31,7 @@ async function fetchGlb(
 ): Promise<ArrayBuffer> {
   const response = await request(fileAddress(base, path), path, { signal });
   const bytes = await readBody(response, path);
-  checkGlb(bytes, path); // describes a file cut short better than its hash
+  checkGlb(bytes, path); // first, since its message is clearer for a file that is cut short than that of the hash
   await checkHash(path, bytes, hash, SHA_256_128);
   return bytes.buffer;
 }
@@ -41,10 +41,10 @@ type TileJson = Readonly<{
   children?: readonly TileJson[];
 }>;
 
-/** The part of a tileset.json that the viewer reads itself; the renderer knows the rest. */
+/** The part of a tileset.json that the viewer itself reads; the renderer reads the rest. */
 export type Tileset = Readonly<{ asset: Readonly<{ version: string }>; root: TileJson }>;
 
-/** A tileset.json with a version and a root, which the renderer takes for granted. */
+/** Checks that a tileset.json has a version and a root, which the renderer requires, and returns it. */
 export function checkTileset(value: unknown, path: string): Tileset {
   const tileset = value as { asset?: { version?: unknown }; root?: { children?: unknown } } | null;
   const { root } = tileset ?? {};
@@ -56,8 +56,8 @@ export function checkTileset(value: unknown, path: string): Tileset {
 }
 
 /**
- * The hash of every file that a tileset names, surface or external tileset, by the file's address;
- * `address` is the tileset's own. Throws BundleError.
+ * Returns the hashes of all files that a tileset names (surfaces and external tilesets) by the files' addresses.
+ * `address` is the tileset's own address. Throws BundleError.
  */
 export function contentHashes(
   { root }: Tileset,
@@ -86,7 +86,7 @@ async function fetchTileset(base: string, file: FileRef): Promise<Tileset> {
   return checkTileset(parseJson(text, file.path), file.path);
 }
 
-/** An external tileset; the one above it gave `hash`. Throws BundleError, or AbortError. */
+/** Returns an external tileset, whose `hash` is in the tileset that names it. Throws BundleError, or AbortError. */
 async function fetchExternal(
   base: string,
   path: string,
@@ -95,16 +95,16 @@ async function fetchExternal(
 ): Promise<Tileset> {
   const response = await request(fileAddress(base, path), path, { signal });
   const bytes = await readBody(response, path);
-  // describes a host's error page better than its hash
+  // The content is checked before the hash, since that gives a clearer message for a host's error page.
   const tileset = checkTileset(parseJson(new TextDecoder().decode(bytes), path), path);
   await checkHash(path, bytes, hash, SHA_256_128);
   return tileset;
 }
 
 /**
- * The files of one channel's tileset, by the addresses that the renderer asks for: those of the
- * bundle without its query, which goes with every request (see fileAddress). A file is known by its
- * hash once a tileset that names it has come.
+ * The files of one channel's tileset, by the addresses that the renderer requests. These lack the query of the bundle's
+ * address, which is added to each request (see fileAddress). A file can be fetched once a tileset that states its hash
+ * has been read.
  */
 export class TilesetFiles {
   /** Address of the channel's tileset.json. */
@@ -120,12 +120,12 @@ export class TilesetFiles {
     this.root = new URL(file.path, this.folder).href;
   }
 
-  /** A file's path in the bundle. */
+  /** Returns a file's path in the bundle. */
   nameOf(address: string): string {
     return decodeURIComponent(address.replace(this.folder, ""));
   }
 
-  /** A tileset, or the bytes of a surface. Throws BundleError, or AbortError. */
+  /** Returns a tileset, or the bytes of a surface. Throws BundleError, or AbortError. */
   async fetch(address: string, signal?: AbortSignal | null): Promise<Tileset | ArrayBuffer> {
     const { base, file } = this;
     if (address === this.root) return this.learn(await fetchTileset(base, file), address);
@@ -139,7 +139,7 @@ export class TilesetFiles {
   private learn(tileset: Tileset, address: string): Tileset {
     const found = contentHashes(tileset, this.nameOf(address), address);
     for (const [each, hash] of found) this.hashes.set(each, hash);
-    // of 1.1 the renderer warns; it knows all that is new there in a bundle: glTF as content
+    // The renderer warns about version 1.1. A bundle uses only one new feature of it, glTF content, which works.
     return { ...tileset, asset: { ...tileset.asset, version: "1.0" } };
   }
 }

@@ -1,4 +1,4 @@
-/** A two-dimensional transfer function as a bundle has it: shapes, and the size of its tables. Pure. */
+/** A two-dimensional transfer function of a bundle: its shapes, and the size of its tables. Pure. */
 import type { ChannelTransfer2D } from "./generated/transfer2d";
 
 export const ROWS = 64;
@@ -8,7 +8,7 @@ export const MAX_SHAPES = 32;
 export type Range = readonly [number, number];
 export type ShapeKind = "rectangle" | "triangle";
 
-/** One shape, as transfer2d.schema.json describes it; all numbers 0..1. */
+/** A shape, described in transfer2d.schema.json; all numbers are 0..1. */
 export type Shape = Readonly<{
   kind: ShapeKind;
   values: Range;
@@ -21,13 +21,13 @@ export type Shape = Readonly<{
 export type Shapes = readonly Shape[];
 
 /**
- * A channel's two-dimensional functions and the numbers that they are read by, as transfer2d.json has
- * them; without its histogram.
+ * A channel's two-dimensional functions and the numbers that describe their axes, from transfer2d.json; without the
+ * histogram.
  */
 export type Transfer2d = Readonly<Omit<ChannelTransfer2D, "functions" | "histogram" | "most">> &
   Readonly<{ functions: Readonly<Record<string, Shapes>> }>;
 
-/** The fault of a shape that came from outside; null: none. */
+/** Returns the fault of a shape from a file or a link; null if it has none. */
 export function faultOf(shape: Shape): string | null {
   if (shape.kind !== "rectangle" && shape.kind !== "triangle") return `kind is ${shape.kind}`;
   for (const name of ["values", "gradients"] as const) {

@@ -1,13 +1,13 @@
-/** Voxels as they were measured, from a host that has the stage beside the bundle. */
+/** Fetches measured values of voxels from a host that has the stage in addition to the bundle. */
 import type { Vec3 } from "../math/vec3";
 import { fileAddress, parseJson, readBody, request } from "./fetch";
 
-/** The server's word for it, on every answer. */
+/** Header by which the server reports, on every response, that it has measured values. */
 const HEADER = "Stereocell-Values";
-/** Values that are kept. */
+/** Largest number of values that are kept. */
 const MAX_KEPT = 4096;
 
-/** The address below which values are; null: the host has none. */
+/** Returns the address below which values are; null if the host has none. */
 export function valuesAddress(headers: Headers, base: string): string | null {
   return headers.get(HEADER)?.trim() === "version=1" ? new URL("values/", base).href : null;
 }
@@ -19,12 +19,12 @@ export class ValuesHost {
   /** @param address as `valuesAddress` returns it */
   constructor(private readonly address: string) {}
 
-  /** The value of a voxel, by its centre in the volume's own um; null: none is known (yet). */
+  /** Returns the value of a voxel, given by its centre in the volume's own um; null if it was not fetched. */
   known(tile: string, channel: string, voxel_um: Vec3): number | null {
     return this.values.get(keyOf(tile, channel, voxel_um)) ?? null;
   }
 
-  /** The same, asked for if need be; null: the host has none. Throws BundleError. */
+  /** Fetches the value of a voxel if it is not known yet; null if the host has none. Throws BundleError. */
   ask(tile: string, channel: string, voxel_um: Vec3): Promise<number | null> {
     const key = keyOf(tile, channel, voxel_um);
     const before = this.answers.get(key);

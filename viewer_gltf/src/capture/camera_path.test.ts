@@ -5,7 +5,7 @@ const away = ({ position, target }: ReturnType<typeof turntable>[number]) =>
   Math.hypot(...position.map((v, i) => v - target[i]));
 
 describe("a turntable", () => {
-  it("goes once round at one distance and height, and joins its start", () => {
+  it("goes once around at the same distance and height, and ends just before its start", () => {
     const path = turntable({ position: [0.3, 0.4, 1.2], target: [0.1, 0, 0] }, 90);
     const [first] = path;
     first.position.forEach((v, i) => {
@@ -28,7 +28,7 @@ describe("a path through views", () => {
     { position: [0, 0, -0.8], target: [0, 0, 0] },
   ] as const;
 
-  it("begins, passes and ends at them, and stays away from what is looked at", () => {
+  it("begins and ends at views, passes through the others, and stays away from the target", () => {
     const path = pathThrough(views, 121);
     for (const [i, k] of [
       [0, 0],

@@ -1,8 +1,8 @@
-/** Where a camera goes: once round, or through views that were kept. Metres of the room. Pure. */
+/** Paths of a video's camera: once around the specimen, or through saved views. In metres of the scene. Pure. */
 import { CatmullRomCurve3, Spherical, Vector3 } from "three";
 import type { KeptView } from "../state/kept_views";
 
-/** Round the point that is looked at, at the same height: a full turn in so many frames. */
+/** Returns `count` views of a full turn around the target, at the same height. */
 export function turntable({ position, target }: KeptView, count: number): readonly KeptView[] {
   const offset = new Vector3(...position).sub(new Vector3(...target));
   const start = new Spherical().setFromVector3(offset);
@@ -13,9 +13,9 @@ export function turntable({ position, target }: KeptView, count: number): readon
   });
 }
 
-/** From the first to the last, round the corners, slower at both ends. At least two views. */
+/** Returns `count` views on a smooth path through at least two views, slower at both ends. */
 export function pathThrough(views: readonly KeptView[], count: number): readonly KeptView[] {
-  // the eye goes round what it looks at, not through it: direction and distance apart
+  // Direction and distance are interpolated separately, so that the eye moves around the target, not through it.
   const targets = curve(views.map(({ target }) => new Vector3(...target)));
   const offsets = views.map(({ position, target }) =>
     new Vector3(...position).sub(new Vector3(...target)),
@@ -28,7 +28,7 @@ export function pathThrough(views: readonly KeptView[], count: number): readonly
     const target = targets.getPoint(eased);
     const away = Math.exp(distances.getPoint(eased).x);
     const direction = directions.getPoint(eased);
-    if (direction.length() < 1e-6) direction.set(0, 0, 1); // half-way between opposite sides
+    if (direction.length() < 1e-6) direction.set(0, 0, 1); // opposite directions cancel out half-way
     const position = direction.setLength(away).add(target);
     return { position: position.toArray(), target: target.toArray() };
   });

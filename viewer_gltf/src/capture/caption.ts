@@ -1,4 +1,4 @@
-/** Scale bar, legend and orientation on a saved picture, as they lie over the stage. */
+/** Draws scale bar, legend and axes on a saved image, like those over the view on the screen. */
 
 import type { Matrix4 } from "three";
 import { type Axis, axesSeen } from "../marks/axes";
@@ -6,23 +6,23 @@ import { AXIS_COLORS } from "../marks/style";
 import { chooseScaleBar } from "../math/round_length";
 import { type Corner, clearestOf, inCorners, type Rect } from "./label_boxes";
 
-/** A line: one colour is a dot, several are a bar from end to end; none: words alone. */
+/** A line of the legend. One colour is a dot, several are a gradient bar, and none means text only. */
 export type LegendEntry = Readonly<{ name: string; colors: readonly string[]; text: string }>;
 
 export type Caption = Readonly<{
-  /** Of the screen, at what is looked at; null: there is no scale. */
+  /** Scale at the camera's target, um per CSS pixel of the screen; null if there is no scale. */
   um_per_px: number | null;
   legend: readonly LegendEntry[];
   axes: readonly Axis[];
   head: Matrix4;
   specimen: Matrix4;
-  /** Whether the background is light: then the words are dark. */
+  /** Whether the background is light, so that texts are dark. */
   isLight: boolean;
-  /** Labels in the picture, pixels of the screen: what is written keeps clear of them. */
+  /** Boxes of labels in the image, pixels of the screen; the caption avoids them. */
   labels: readonly Rect[];
 }>;
 
-/** Colours of a caption: `ink` for the scale bar and names, `halo` for their outline, `faint` for other words. */
+/** Colours of a caption: `ink` for the scale bar and names, `halo` for their outline, `faint` for other texts. */
 const DARK_INKS = { ink: "#fff", halo: "#000", faint: "#cfd6e4" } as const;
 const LIGHT_INKS = { ink: "#1a1f29", halo: "#fff", faint: "#3d4656" } as const;
 type Inks = Readonly<Record<keyof typeof DARK_INKS, string>>;
@@ -34,7 +34,7 @@ const TEXT_FONT = `12px ${FONT}`;
 const EDGE = 16;
 const LINE = 20;
 const BAR_HEIGHT = 28;
-/** Edge of the axes' square. */
+/** Edge of the square around the axes, CSS pixels. */
 const AXES = 84;
 
 const CORNERS = {
@@ -43,7 +43,7 @@ const CORNERS = {
   legend: ["top-left", "top-right", "bottom-left", "bottom-right"],
 } as const satisfies Readonly<Record<string, readonly Corner[]>>;
 
-/** @param scale pixels of the picture to one of the screen */
+/** @param scale pixels of the image for each CSS pixel of the screen */
 export function drawCaption(
   context: CanvasRenderingContext2D,
   { width, height }: Readonly<{ width: number; height: number }>,
@@ -74,7 +74,7 @@ export function drawCaption(
   }
   const square = placeFor("axes", AXES, AXES);
   const middle = AXES / 2;
-  // the axes' colours are for a dark picture
+  // The axes' colours are made for a dark background.
   if (isLight) context.filter = "brightness(0.6)";
   drawAxes(context, square.x + middle, square.y + middle, axes, axesSeen(head, specimen, axes));
   context.filter = "none";
@@ -105,7 +105,7 @@ function drawScaleBar(
   context.fillText(label, x, line + 14);
 }
 
-/** From the left: the dot or the bar, the name, the text. */
+/** Widths of the dot and of the bar, which come before the name and the text, CSS pixels. */
 const [DOT, BAR] = [12, 72];
 const GAP = 8;
 
@@ -187,7 +187,7 @@ function drawAxes(
     context.moveTo(x, y);
     context.lineTo(x + 26 * at.x, y - 26 * at.y);
     context.stroke();
-    const isBehind = axes[i].ends[1] !== null && at.z < -0.9; // its opposite lies over it
+    const isBehind = axes[i].ends[1] !== null && at.z < -0.9; // the letter at the opposite end covers this one
     if (!isBehind) context.fillText(text, x + 33 * at.x, y - 33 * at.y);
   }
   context.globalAlpha = 1;

@@ -1,13 +1,13 @@
 /**
- * Frames of a canvas as a video, by the browser's own encoder; where it has none, as PNG files in a zip.
+ * Writes frames of a canvas as a video with the browser's own encoder, or as PNG files in a zip if it has none.
  */
 import { type EncodedFrame, writeWebm } from "./webm";
 
 export const FRAMES_PER_S = 30;
-/** Bits to a pixel of a frame: fine lines stay sharp. */
+/** Bits per pixel of a frame; enough to keep fine lines sharp. */
 const BITS_PER_PIXEL = 0.25;
 const KEY_EVERY = 60;
-/** Most frames that wait to be encoded. */
+/** Largest number of frames that wait for the encoder. */
 const MAX_WAITING = 4;
 
 export type FilmedFile = Readonly<{ content: Blob; suffix: "webm" | "zip" }>;
@@ -15,11 +15,11 @@ export type FilmedFile = Readonly<{ content: Blob; suffix: "webm" | "zip" }>;
 export interface FrameWriter {
   add(canvas: HTMLCanvasElement): Promise<void>;
   finish(): Promise<FilmedFile>;
-  /** Leave it. */
+  /** Cancels the video. */
   close(): void;
 }
 
-/** @param width even, as is the height */
+/** @param width even, like the height */
 export async function frameWriter(width: number, height: number): Promise<FrameWriter> {
   const config: VideoEncoderConfig = {
     codec: "vp8",
@@ -28,7 +28,7 @@ export async function frameWriter(width: number, height: number): Promise<FrameW
     framerate: FRAMES_PER_S,
     bitrate: Math.round(width * height * FRAMES_PER_S * BITS_PER_PIXEL),
   };
-  // a page without a secure address has no encoder, in spite of the types
+  // Outside a secure context there is no encoder, although the types claim that there always is one.
   const isThere = typeof VideoEncoder !== "undefined" && typeof VideoFrame !== "undefined";
   const support = isThere ? await VideoEncoder.isConfigSupported(config).catch(() => null) : null;
   return support?.supported === true ? new VideoWriter(config) : new ZipWriter();
@@ -93,7 +93,7 @@ class ZipWriter implements FrameWriter {
 
   async finish(): Promise<FilmedFile> {
     const { zipSync } = await import("three/examples/jsm/libs/fflate.module.js");
-    const zip = zipSync(this.files, { level: 0 }); // PNGs are packed already
+    const zip = zipSync(this.files, { level: 0 }); // PNG files are already compressed
     const content = new Blob([new Uint8Array(zip)], { type: "application/zip" });
     return { content, suffix: "zip" };
   }
@@ -103,7 +103,7 @@ class ZipWriter implements FrameWriter {
   }
 }
 
-/** Rejects where the browser has no memory for it. */
+/** Returns a canvas as a PNG file. Rejects if the browser has too little memory. */
 export function pngOf(canvas: HTMLCanvasElement): Promise<Blob> {
   return new Promise((resolve, reject) => {
     canvas.toBlob((blob) => {

@@ -1,10 +1,10 @@
-/** Where labels of the scene lie in a picture, so that scale bar, legend and axes keep clear of them. */
+/** Finds the boxes of the scene's labels in an image, so that scale bar, legend and axes can avoid them. */
 import { type Object3D, type PerspectiveCamera, Sprite, Vector3 } from "three";
 
-/** Pixels, y down. */
+/** A rectangle in pixels, y down. */
 export type Rect = Readonly<{ x: number; y: number; width: number; height: number }>;
 
-/** Of all labels that are shown below `root`, in a picture of a camera. */
+/** Returns the boxes of all visible labels below `root` in a camera's image. */
 export function labelBoxes(
   root: Object3D,
   camera: PerspectiveCamera,
@@ -30,7 +30,7 @@ export function labelBoxes(
   return found;
 }
 
-/** The area that a rectangle shares with others. */
+/** Returns the area that a rectangle shares with others. */
 function shared(rect: Rect, others: readonly Rect[]): number {
   const within = (a: number, aSize: number, b: number, bSize: number) =>
     Math.max(0, Math.min(a + aSize, b + bSize) - Math.max(a, b));
@@ -41,7 +41,7 @@ function shared(rect: Rect, others: readonly Rect[]): number {
   );
 }
 
-/** The first of the places that is clear of others, or that which shares the least with them. */
+/** Returns the first place that overlaps no other rectangle, or the one that overlaps them least. */
 export function clearestOf(places: readonly Rect[], others: readonly Rect[]): Rect {
   return places.reduce((best, place) =>
     shared(place, others) < shared(best, others) ? place : best,
@@ -50,7 +50,7 @@ export function clearestOf(places: readonly Rect[], others: readonly Rect[]): Re
 
 export type Corner = "top-left" | "top-right" | "bottom-left" | "bottom-right";
 
-/** A block of such a size in the corners of a picture, in this order. */
+/** Returns a block's places in the given corners of an image, in this order. */
 export function inCorners(
   corners: readonly Corner[],
   block: Readonly<{ width: number; height: number }>,

@@ -20,7 +20,7 @@ it("a channel has its colour and the values of its window", () => {
   expect(entry.text).toMatch(/^\S+ – \S+/);
 });
 
-it("a label map has what its colours mean, and no window: its numbers are no values", () => {
+it("a label map has the meaning of its colours, and no window, because its numbers are not values", () => {
   const rows = [
     { colors: ["#e69f00"], text: "T cell" },
     { colors: [], text: "and 3 more" },

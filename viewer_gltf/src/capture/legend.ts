@@ -1,4 +1,4 @@
-/** The shown channels, for a picture: name, colour, and the values that the window spans. Pure. */
+/** Makes the legend of a saved image: name, colour and window of each shown channel. Pure. */
 
 import type { Manifest } from "../bundle/generated/bundle";
 import type { ColorLegend } from "../host/services";
@@ -7,7 +7,7 @@ import { unitOf, valueText } from "../probe/measure";
 import type { ViewerState } from "../state/viewer_state";
 import type { LegendEntry } from "./caption";
 
-/** @param colorsOf what the colours of a label map's objects mean; null: they have the channel's, or the stage's */
+/** @param colorsOf returns the meaning of the objects' colours; null if they have the colour of the channel or stage */
 export function legendOf(
   state: ViewerState,
   manifest: Manifest,
@@ -19,7 +19,8 @@ export function legendOf(
     const dot = [toHex(color)];
     if (found.objects !== undefined) {
       const legend = colorsOf(id);
-      if (legend === null) return [{ name, colors: dot, text: "" }]; // its numbers are names, no values
+      // The values of a label map are names of objects, so that a window has no meaning.
+      if (legend === null) return [{ name, colors: dot, text: "" }];
       const rows = legend.rows.map((row) => ({ name: "", ...row }));
       return [{ name, colors: [], text: `by ${legend.column}` }, ...rows];
     }

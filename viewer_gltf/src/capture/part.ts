@@ -1,4 +1,4 @@
-/** The part of the viewer that saves pictures and videos, and keeps the views that a video passes through. */
+/** The part of the viewer that saves images and videos, and keeps the views that a video passes through. */
 import { fileName, saveFile } from "../dom/save_file";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PosterMaker } from "../host/services";
@@ -13,7 +13,7 @@ const ON_THE_SCREEN = "Pictures and videos can only be saved on a flat screen. L
 const NEXT_KEPT = "“Next kept view” shows one after the other.";
 const ONLY_VIEW = "That is the only kept view.";
 
-/** A file that was made; null: the user has cancelled it. */
+/** A file that was made; null if the user has cancelled it. */
 type Made = Readonly<{ suffix: string; content: Blob }> | null;
 
 /** Loads the code that draws and writes files. Rejects with a DOMException. */
@@ -38,14 +38,14 @@ class CapturePart implements Part, PosterMaker {
     "save-picture": () => void this.save("picture", (signal) => this.makePicture(signal)),
     "save-video": () => void this.save("video", (signal) => this.makeVideo(signal)),
   };
-  /** While a picture or a video is made. */
+  /** Cancels the image or video that is being made; null if none is. */
   private filming: AbortController | null = null;
-  /** Index of the kept view that is shown next. */
+  /** Index of the saved view that is shown next. */
   private nextView = 0;
 
   constructor(private readonly host: PartHost) {}
 
-  /** The views of the stage's cameras are kept from the start, unless the address keeps others. */
+  /** Keeps the views of the stage's cameras, unless the address contains saved views. */
   afterOpening(): void {
     const { state, bundle } = this.host;
     const views = stageViews(bundle.manifest);
@@ -78,7 +78,7 @@ class CapturePart implements Part, PosterMaker {
     };
   }
 
-  /** Makes a picture of the view in the chosen size. */
+  /** Makes an image of the view in the chosen size. */
   private async makePicture(signal: AbortSignal): Promise<Made> {
     const { savePicture } = await loadSaving();
     const scale = Number(this.host.state.pictureSize);
@@ -169,7 +169,7 @@ class CapturePart implements Part, PosterMaker {
     const { name, ...look } = keptViews[this.nextView++ % keptViews.length];
     viewpoint.lookFlatFrom(look);
     if (name !== undefined) this.host.announce(`View: ${name}`);
-    this.host.panel.refresh(); // the button names the view after this one
+    this.host.panel.refresh(); // the button now names the following view
     if (viewpoint.isAt(before)) this.host.announce(ONLY_VIEW);
     return true;
   }

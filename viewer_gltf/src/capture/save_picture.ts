@@ -1,4 +1,4 @@
-/** Pictures larger than the screen, and videos: drawn apart from the frames of the page, which wait. */
+/** Makes images larger than the screen, and videos. The page's own frames wait meanwhile. */
 import type { Matrix4, Object3D, WebGLRenderer } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import { element } from "../dom/element";
@@ -15,18 +15,18 @@ import { type FilmedFile, FRAMES_PER_S, frameWriter, pngOf } from "./encode_vide
 import { labelBoxes } from "./label_boxes";
 import { legendOf } from "./legend";
 
-/** Most pixels of a picture: browsers refuse larger canvases, phones at less. */
+/** Largest number of pixels of an image. Browsers refuse larger canvases, and phones have lower limits. */
 const MAX_PIXELS = 120e6;
-/** Longest time for one part of a picture, and for one frame of a video, ms: then it is as good as it is. */
+/** Longest time to draw one part of an image, ms, without and with path tracing; after that it is used as it is. */
 const PART_MS = 8000;
 const TRACED_PART_MS = 60_000;
-/** Between two times that the page gets on with what else there is, ms. */
+/** Longest time of drawing before the page may do other work, ms. */
 const SLICE_MS = 500;
 const FRAME_MS = 400;
 const TRACED_FRAME_MS = 1500;
 /** Longest wait of a frame of a video for finer surfaces and volumes, ms. */
 const ARRIVAL_MS = 5000;
-/** Length of a video: once round, and from one kept view to the next, s. */
+/** Length of a video: of a full turn, and from one saved view to the next, s. */
 const ROUND_S = 6;
 const LEG_S = 2;
 /** Longest edge of a video, pixels. */
@@ -36,19 +36,19 @@ export type Scene = Readonly<{
   renderer: WebGLRenderer;
   navigation: Navigation;
   studio: StillMaker;
-  /** Of the stage, CSS pixels. */
+  /** Height of the view, CSS pixels. */
   height_px: number;
-  /** From um to the room. */
+  /** From um to the scene. */
   specimen: Matrix4;
-  /** What has labels in it. */
+  /** Contains the labels of the scene. */
   labelled: Object3D;
   state: ViewerState;
   manifest: Manifest;
-  /** What the colours of a label map's objects mean. */
+  /** Returns the meaning of the colours of a label map's objects. */
   colorsOf: Parameters<typeof legendOf>[2];
 }>;
 
-/** What is written on it, as the camera stands now. */
+/** Returns the caption for the present camera. */
 function captionOf({ navigation, height_px, specimen, state, manifest, colorsOf }: Scene): Caption {
   const { camera, controls } = navigation;
   const m_per_um = specimen.getMaxScaleOnAxis();
@@ -59,11 +59,11 @@ function captionOf({ navigation, height_px, specimen, state, manifest, colorsOf 
     head: camera.matrixWorld,
     specimen,
     isLight: document.documentElement.dataset.theme === "light",
-    labels: [], // in a video they move, and nothing is to hop about for them
+    labels: [], // in a video labels move, and the caption must not jump from corner to corner to avoid them
   };
 }
 
-/** The same, clear of the labels in the picture. */
+/** Returns the caption for the present camera, with parts that avoid the labels in the image. */
 function clearCaptionOf(scene: Scene): Caption {
   const { navigation, labelled, height_px } = scene;
   const { camera } = navigation;
@@ -71,7 +71,7 @@ function clearCaptionOf(scene: Scene): Caption {
   return { ...captionOf(scene), labels: labelBoxes(labelled, camera, size) };
 }
 
-/** Let the page do what waits. Not by a timer: those of a page that nobody sees tick once a second. */
+/** Lets the page do waiting work. A timer is not used, since timers of a hidden page run only once a second. */
 function turn(): Promise<void> {
   const { port1, port2 } = new MessageChannel();
   return new Promise((resolve) => {
@@ -91,12 +91,12 @@ function canvasOf(width: number, height: number) {
 }
 
 /**
- * The view, `scale` times as large as the screen has it, part by part: each fills the screen's own canvas,
- * so that no more of the GPU's memory is needed. Scale bar, legend and axes are drawn on it. A traced one is
- * gathered until it is clear.
+ * Makes an image of the view, larger than the screen by the factor `wanted` if that is possible. It is drawn part by
+ * part on the screen's own canvas, so that it needs no additional memory of the GPU. Scale bar, legend and axes are
+ * drawn on it. Path tracing gathers light in each part until it is clear.
  *
- * @param onPart told in words how far it is
- * @returns null: it was left
+ * @param onPart called with a text about the progress
+ * @returns the image; null if it was cancelled
  */
 export function savePicture(
   scene: Scene,
@@ -107,13 +107,13 @@ export function savePicture(
   const { renderer, studio, navigation } = scene;
   const { camera } = navigation;
   const { width, height } = renderer.domElement;
-  const isTwo = scene.state.screenStereo === "side-by-side"; // whose halves are no parts of one picture
+  const isTwo = scene.state.screenStereo === "side-by-side"; // its halves can't be drawn in parts
   const most = isTwo ? 1 : Math.floor(Math.sqrt(MAX_PIXELS / (width * height)));
   const scale = Math.max(1, Math.min(wanted, most));
-  const eye = isTwo ? width / 2 : width; // of what the camera sees
+  const eye = isTwo ? width / 2 : width; // width of the camera's view
   return studio.apart(async () => {
     const { canvas, context } = canvasOf(scale * width, scale * height);
-    const words = clearCaptionOf(scene); // before the camera sees parts alone
+    const words = clearCaptionOf(scene); // made before the camera is limited to one part
     try {
       for (let row = 0; row < scale; row++) {
         for (let column = 0; column < scale; column++) {
@@ -122,7 +122,7 @@ export function savePicture(
           const part = `part ${row * scale + column + 1} of ${scale * scale}`;
           const isWhole = await drawPart(studio, part, onPart, signal);
           if (!isWhole) return null;
-          context.drawImage(renderer.domElement, x, y); // in the turn that it was drawn in
+          context.drawImage(renderer.domElement, x, y); // must follow drawing at once: the canvas is cleared later
           await turn();
         }
       }
@@ -134,7 +134,7 @@ export function savePicture(
   });
 }
 
-/** The view as the screen has it, smaller, drawn as well as can be in a moment. */
+/** Makes a small image of the view, drawn within a short time. */
 export function posterOf(scene: Scene, longest_px: number): Promise<Blob> {
   const { renderer, studio } = scene;
   const { width, height } = renderer.domElement;
@@ -149,7 +149,7 @@ export function posterOf(scene: Scene, longest_px: number): Promise<Blob> {
   });
 }
 
-/** Draw what the camera sees until it is clear, or its time is over; false: it was left. */
+/** Draws the camera's view until it is clear or the time is over; returns false if it was cancelled. */
 async function drawPart(
   studio: StillMaker,
   part: string,
@@ -169,7 +169,10 @@ async function drawPart(
   }
 }
 
-/** Through views, if there are two, else once round; `onSecond` after each second of it. Null: it was left. */
+/**
+ * Makes a video through the saved views if there are at least two, otherwise once around the specimen. Calls `onSecond`
+ * for each second of it, and returns null if it was cancelled.
+ */
 export function saveVideo(
   scene: Scene,
   views: readonly KeptView[],

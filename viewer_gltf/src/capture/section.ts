@@ -1,4 +1,4 @@
-/** The panel's section for pictures and videos, and its keys. Pure. */
+/** The panel's section for images and videos, and its keys. Pure. */
 
 import { command, controlsOf } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
@@ -26,7 +26,7 @@ function saveItems(state: ViewerState, isFilming: boolean, next: number): readon
 }
 
 export const SAVE_COMMANDS = [
-  /** Saves a picture of the view in the chosen size. A second use cancels. */
+  /** Saves an image of the view in the chosen size. A second use cancels. */
   "save-picture",
   /** Saves a video once around the specimen, or through the kept views. A second use cancels. */
   "save-video",

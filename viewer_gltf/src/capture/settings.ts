@@ -1,4 +1,4 @@
-/** The setting of saved pictures. Pure. */
+/** The settings of saved images. Pure. */
 import { type ChoiceParameter, lensesOf } from "../state/parameters/kinds";
 import type { PartSettings } from "../state/part_settings";
 
@@ -6,7 +6,7 @@ const PICTURE_SIZES = ["1", "2", "4"] as const;
 type PictureSize = (typeof PICTURE_SIZES)[number];
 
 const START_CAPTURE = {
-  /** How many times as large as the screen a saved picture is. */
+  /** Factor by which a saved image is larger than the view on the screen. */
   pictureSize: "2" as PictureSize,
 };
 

@@ -11,20 +11,20 @@ const MANIFEST = {
 } as unknown as Manifest;
 
 describe("the views of a stage's cameras", () => {
-  it("are in metres about the specimen's middle, in the stage's order", () => {
+  it("are in metres around the specimen's centre, in the stage's order", () => {
     const [close] = stageViews(MANIFEST);
     expect(close.name).toBe("Close");
     expect(close.target).toEqual([0, 0, 0]);
-    expect(close.position[2]).toBeCloseTo((20 / 20) * 1.2, 9); // the longest edge is 1.2 m
+    expect(close.position[2]).toBeCloseTo((20 / 20) * 1.2, 9); // the longest edge, 20, is 1.2 m in the scene
   });
 
-  it("show as much at the target as the stage's camera does", () => {
+  it("show the same extent at the target as the stage's camera", () => {
     const wide = stageViews(MANIFEST)[1];
     const half = wide.position[2] * Math.tan((20 * Math.PI) / 180);
     expect(half).toBeCloseTo(1.2 * Math.tan((40 * Math.PI) / 180), 9);
   });
 
-  it("are none where the stage has no camera", () => {
+  it("are empty if the stage has no camera", () => {
     expect(stageViews({ ...MANIFEST, views: undefined })).toEqual([]);
   });
 });

@@ -1,4 +1,4 @@
-/** The views of the stage's cameras, as the viewer keeps views. Pure. */
+/** Converts the stage's cameras to saved views. Pure. */
 import type { Manifest } from "../bundle/generated/bundle";
 import { FIELD_OF_VIEW_DEG } from "../interaction/named_views";
 import type { Vec3 } from "../math/vec3";
@@ -8,8 +8,8 @@ import { type KeptView, MAX_VIEWS } from "../state/kept_views";
 const halfTan = (degrees: number) => Math.tan((degrees * Math.PI) / 360);
 
 /**
- * The views in metres of the room. The viewer's lens is always the same, so it stands nearer or farther than the
- * stage's camera: as much shows at the target.
+ * Returns the views in metres of the scene. The viewer's field of view is fixed, so that its camera is nearer or farther
+ * than the stage's camera, to show the same extent at the target.
  */
 export function stageViews({ views, specimen }: Manifest): readonly KeptView[] {
   const { center, scale } = place(specimen.bounds_um);

@@ -1,12 +1,12 @@
 import { describe, expect, it } from "vitest";
 import { type EncodedFrame, writeWebm } from "./webm";
 
-/** Elements whose content is elements. */
+/** IDs of elements that contain other elements. */
 const MASTERS = new Set([0x1a45dfa3, 0x18538067, 0x1549a966, 0x1654ae6b, 0xae, 0xe0, 0x1f43b675]);
 
 type Found = Readonly<{ id: number; content: Uint8Array; inner: readonly Found[] }>;
 
-/** Read by the rules of EBML: ids and lengths are as long as their first byte's leading zeros say. */
+/** Reads elements by the rules of EBML: the leading zeros of the first byte give the length of an ID or a length. */
 function read(bytes: Uint8Array): readonly Found[] {
   const found: Found[] = [];
   for (let at = 0; at < bytes.length; ) {
@@ -39,7 +39,7 @@ describe("a WebM file", () => {
   const track = { codec: "V_VP8", width: 640, height: 360, frame_ms: 1000 / 30 };
   const file = read(writeWebm(track, frames));
 
-  it("has a header, its length, and a track of that size", () => {
+  it("has a header, a duration, and a track of the given size", () => {
     expect(file.map(({ id }) => id)).toEqual([0x1a45dfa3, 0x18538067]);
     expect(new TextDecoder().decode(all(file, 0x4282)[0].content)).toBe("webm");
     expect(new TextDecoder().decode(all(file, 0x86)[0].content)).toBe("V_VP8");
@@ -48,7 +48,7 @@ describe("a WebM file", () => {
     expect(duration).toBeCloseTo((130 * 1000) / 30, 6);
   });
 
-  it("has every frame once, at its time, each cluster begun by a key frame", () => {
+  it("has every frame once at its time, and each cluster begins with a key frame", () => {
     const clusters = all(file, 0x1f43b675);
     expect(clusters).toHaveLength(3);
     const times = clusters.flatMap(({ inner }) => {

@@ -1,5 +1,5 @@
 /**
- * A WebM file of one track of video, of frames that are encoded already. Pure.
+ * Writes a WebM file with one video track from encoded frames. Pure.
  *
  * References: RFC 8794 (EBML), RFC 9559 (Matroska).
  */
@@ -7,7 +7,7 @@
 export type EncodedFrame = Readonly<{ data: Uint8Array; time_ms: number; isKey: boolean }>;
 
 export type VideoTrack = Readonly<{
-  /** `V_VP8`, `V_VP9`. */
+  /** `V_VP8` or `V_VP9`. */
   codec: string;
   width: number;
   height: number;
@@ -17,7 +17,7 @@ export type VideoTrack = Readonly<{
 type Node = Uint8Array | readonly Node[];
 
 const NAME = "StereoCell";
-/** Times in a block are 16 bits with a sign, ms from its cluster's. */
+/** Longest cluster, ms. Times in a block are signed 16-bit numbers, in ms from the cluster's time. */
 const LONGEST_CLUSTER_MS = 30_000;
 
 function bytesOf(node: Node): number {
@@ -26,12 +26,12 @@ function bytesOf(node: Node): number {
     : node.reduce((sum, each) => sum + bytesOf(each), 0);
 }
 
-/** An element: its id, as it is written, its length in 8 bytes, and its content. */
+/** Returns an element: its ID in encoded form, its length in 8 bytes, and its content. */
 function element(id: number, ...content: readonly Node[]): Node {
   const digits = id.toString(16).match(/../g) ?? [];
   const length = new Uint8Array(8);
   new DataView(length.buffer).setBigUint64(0, BigInt(bytesOf(content)));
-  length[0] = 0x01; // of 8 bytes
+  length[0] = 0x01; // marks a length of 8 bytes
   return [Uint8Array.from(digits.map((digit) => Number.parseInt(digit, 16))), length, content];
 }
 
@@ -49,7 +49,7 @@ function real(id: number, value: number): Node {
 
 const text = (id: number, value: string) => element(id, new TextEncoder().encode(value));
 
-/** The file's parts, one after the other. @param frames in their order; the first is a key frame */
+/** Returns the file's parts in their order. @param frames in the order of time; the first is a key frame */
 export function writeWebm(
   { codec, width, height, frame_ms }: VideoTrack,
   frames: readonly EncodedFrame[],
@@ -67,7 +67,7 @@ export function writeWebm(
   const last = frames.at(-1)?.time_ms ?? 0;
   const info = element(
     0x1549a966,
-    number(0x2ad7b1, 1e6), // ns to a tick
+    number(0x2ad7b1, 1e6), // ns per tick
     real(0x4489, last + frame_ms),
     text(0x4d80, NAME),
     text(0x5741, NAME),
@@ -101,7 +101,7 @@ function clusters(frames: readonly EncodedFrame[]): readonly Node[] {
 
 function block({ data, time_ms, isKey }: EncodedFrame, start_ms: number): Node {
   const head = new Uint8Array(4);
-  head[0] = 0x81; // the first track
+  head[0] = 0x81; // number of the track, 1
   new DataView(head.buffer).setInt16(1, Math.round(time_ms) - start_ms);
   head[3] = isKey ? 0x80 : 0;
   return element(0xa3, head, data);

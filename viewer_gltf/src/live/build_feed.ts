@@ -1,15 +1,15 @@
-/** The websocket to the build behind the page. */
+/** The websocket to the build whose views the page shows. */
 import { LastingSocket } from "../dom/lasting_socket";
 import { type BuildState, readBuildState } from "./build_state";
 
 export type Command = "pause" | "continue" | "cancel";
-/** Frames are late: the build shall rest for a moment. */
+/** Message that frames are late; the build then pauses for a moment. */
 const LATE = "late";
 
 export class BuildFeed {
   private readonly socket: LastingSocket;
 
-  /** @param onState is given each state; null: the server does not answer */
+  /** @param onState called with each state, or with null if the server does not answer */
   constructor(address: string, onState: (state: BuildState | null) => void) {
     const read = (text: string) => {
       const state = readBuildState(text);

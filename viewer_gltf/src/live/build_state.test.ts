@@ -29,13 +29,13 @@ describe("a message of the server", () => {
     });
   });
 
-  it("is left out if it is none", () => {
+  it("is ignored if it has another form", () => {
     for (const text of ["", "null", "[]", "7", '{"doing": "sleeping"}', "{"]) {
       expect(readBuildState(text), text).toBeNull();
     }
   });
 
-  it("leads to no other folder than one of its own", () => {
+  it("can't name a folder outside the page's own", () => {
     for (const folder of ["../", "https://elsewhere/", "g1", "g1/../", "//g1/", 7]) {
       expect(read({ folder }).folder).toBe("");
     }

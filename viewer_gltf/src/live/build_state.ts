@@ -1,34 +1,34 @@
-/** The state of the build behind the page, as the server reports it. Pure. */
+/** The state of the build whose views the page shows, as reported by the server. Pure. */
 
 import { BUILD_STATES } from "../bundle/generated/build_states";
 
 export type BuildState = Readonly<{
   doing: (typeof BUILD_STATES)[number];
-  /** The running part of the build, as `units`, and how far it is; empty: it has not begun. */
+  /** The running part of the build, such as `units`, and its progress; empty if the build has not begun. */
   label: string;
   done: number;
   total: number;
-  /** Tiles that have their surfaces, and all tiles. */
+  /** Number of tiles whose surfaces are finished, and of all tiles. */
   tiles: number;
   allTiles: number;
   /** How much of the build is done, 0..1. */
   share: number;
-  /** s until the end; null: not known. */
+  /** Remaining time, s; null if unknown. */
   left_s: number | null;
-  /** The folder of the newest view, below the page; empty: it is the page's own. */
+  /** The folder of the newest view, below the page; empty if it is the page's own folder. */
   folder: string;
-  /** Whether the bundle is whole, which the page's own address then leads to. */
+  /** Whether the bundle is complete; the page's own address then leads to it. */
   hasBundle: boolean;
-  /** Why the build has failed; or empty. */
+  /** The reason why the build has failed; otherwise empty. */
   line: string;
-  /** From 1 in a queue of builds; 0: it does not wait there. */
+  /** Place in the queue of builds, from 1; 0 if the build is not waiting. */
   place: number;
   mayControl: boolean;
-  /** Whether a build that was cancelled or has failed can begin again. */
+  /** Whether a cancelled or failed build can continue. */
   mayContinue: boolean;
 }>;
 
-/** Reads a message of the server; null: it is none that this page knows. */
+/** Reads a message of the server; null if this page does not know its form. */
 export function readBuildState(text: string): BuildState | null {
   let found: Record<string, unknown>;
   try {
@@ -71,7 +71,7 @@ const PARTS: Readonly<Record<string, string>> = {
 };
 
 /**
- * The state in one line, as `Building surfaces: 3 of 10 tiles, about 40 s left`.
+ * Returns the state as one line, for example `Building surfaces: 3 of 10 tiles, about 40 s left`.
  *
  * @param isShown whether the page shows the newest view of the build
  */
@@ -98,7 +98,7 @@ export function wordsOf(state: BuildState, isShown: boolean): string {
   }
 }
 
-/** The running part of a build, as `units`; the plan is made before the first one. */
+/** Returns the name of a part of a build, such as `units`. Before the first part, the build is being planned. */
 export function partWords(label: string): string {
   return PARTS[label] ?? "Planning the build";
 }
@@ -108,7 +108,7 @@ function tilesOf({ tiles, allTiles, label, done, total }: BuildState): string {
   return total > 1 ? `: ${done} of ${total}` : "";
 }
 
-/** The time until an end, as `, about 40 s left`; empty: it is not known. */
+/** Returns the remaining time, for example `, about 40 s left`; empty if unknown. */
 export function leftWords(left_s: number | null): string {
   if (left_s === null) return "";
   if (left_s < 90) return `, about ${Math.max(5, Math.ceil(left_s / 5) * 5)} s left`;

@@ -5,7 +5,7 @@ const ROOT = "http://localhost:8000/";
 const view = (folder: string) => ({ folder, hasBundle: false });
 const BUNDLE = { folder: "g3/", hasBundle: true };
 
-/** A page that shows views, each when it is let go on. */
+/** A page that shows views; the test decides when it has finished showing each one. */
 function page() {
   const shown: string[] = [];
   const waiting: (() => void)[] = [];
@@ -26,7 +26,7 @@ function page() {
   };
 }
 
-it("shows each newer view, and none twice", async () => {
+it("shows each newer view exactly once", async () => {
   const { show, shown, goOn } = page();
   const views = new ViewFollower(ROOT, "", show);
   views.take(view(""));
@@ -39,7 +39,7 @@ it("shows each newer view, and none twice", async () => {
   expect(shown).toEqual([`${ROOT}g1/`, `${ROOT}g2/`]);
 });
 
-it("leaves out views that have become old while another one was being shown", async () => {
+it("skips views that became outdated while another one was opening", async () => {
   const { show, shown, goOn } = page();
   const views = new ViewFollower(ROOT, "", show);
   views.take(view("g1/"));
@@ -51,7 +51,7 @@ it("leaves out views that have become old while another one was being shown", as
   expect(shown).toEqual([`${ROOT}g1/`, ROOT]);
 });
 
-it("shows the bundle last, at the page's own address, though the first view had it, too", async () => {
+it("shows the bundle last, at the page's own address, even if the first view had that address", async () => {
   const { show, shown, goOn } = page();
   const told: boolean[] = [];
   const views = new ViewFollower(ROOT, "", show, () => told.push(views.isNewestShown));

@@ -1,4 +1,4 @@
-/** Which view of a source the page shows while the source is built: always the newest, one after the other. */
+/** Shows the newest view of a source while the source is built. Views open one after the other. */
 import type { BuildState } from "./build_state";
 
 /** Time after which a view that could not be shown is tried again, ms. */
@@ -10,9 +10,9 @@ export class ViewFollower {
 
   /**
    * @param root the page's own folder
-   * @param shown the address of the view that the page shows; empty: the first one, which the root leads to
-   * @param show puts another view in its place; it may wait until nobody would notice
-   * @param onShown another view has been put in its place
+   * @param shown the address of the view that the page shows; empty for the first one, which is at the root
+   * @param show opens another view in its place; it may wait for a moment at which the change does not disturb
+   * @param onShown called after another view has opened
    */
   constructor(
     private readonly root: string,
@@ -45,7 +45,7 @@ export class ViewFollower {
         this.shown = next;
         this.onShown();
       } catch {
-        await new Promise((resolve) => setTimeout(resolve, this.again_ms)); // the server may be back by then
+        await new Promise((resolve) => setTimeout(resolve, this.again_ms)); // the server may answer again after the pause
       }
     }
     this.isShowing = false;

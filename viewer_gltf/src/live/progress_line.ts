@@ -15,7 +15,7 @@ export class ProgressLine {
     { live: "dismiss" },
   );
   private readonly root: HTMLElement;
-  /** The state in which the user has dismissed the line; empty: the line is not dismissed. */
+  /** The state in which the user has dismissed the line; empty if the line is not dismissed. */
   private dismissed = "";
 
   /** @param parent contains the line while there is something to report */
@@ -50,7 +50,7 @@ export class ProgressLine {
   }
 
   /**
-   * @param state null: the server does not answer
+   * @param state null if the server does not answer
    * @param isShown whether the page shows the newest view of the build
    */
   update(state: BuildState | null, isShown: boolean): void {
@@ -58,7 +58,7 @@ export class ProgressLine {
     const words = state === null ? GONE : wordsOf(state, isShown);
     if (words !== this.dismissed) this.root.hidden = false;
     setText(this.words, words);
-    this.words.title = words; // a narrow window cuts them
+    this.words.title = words; // a narrow window cuts the text off
     if (state !== null) this.fill.style.width = `${100 * state.share}%`;
     this.root.dataset.doing = doing ?? "gone";
     const isFocused = this.root.contains(document.activeElement);
@@ -76,7 +76,7 @@ export class ProgressLine {
     this.keepFocus(isFocused);
   }
 
-  /** Hands the focus of a button that has just been hidden to the next one. */
+  /** Moves the focus from a button that has just been hidden to the next one. */
   private keepFocus(isFocused: boolean): void {
     const buttons = [...Object.values(this.buttons), this.close];
     const { activeElement } = document;

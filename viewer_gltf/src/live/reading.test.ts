@@ -7,11 +7,11 @@ it.each([
   [0, "Reading the source: 0 %"],
   [0.259, "Reading the source: 25 %"],
   [1, "Opening the first view"],
-])("a share of %d is told as %s", (share, words) => {
+])("a share of %d is shown as %s", (share, words) => {
   expect(wordsOfReading(share)).toBe(words);
 });
 
-it("is told while the job goes on, and not afterwards", async () => {
+it("reports progress while the job runs, and not afterwards", async () => {
   const fetched = vi.fn(async (_: URL) => ({ json: async () => ({ share: 0.5 }) }));
   vi.stubGlobal("fetch", fetched);
   const told: string[] = [];
@@ -36,7 +36,7 @@ it("passes on the job's fault, and survives a server that does not answer", asyn
   await expect(whileReading("http://localhost/", job, () => undefined)).rejects.toThrow("gone");
 });
 
-it("is looked for where the server has said so of the page", () => {
+it("runs if the server has announced it in the timing of the page", () => {
   const timing = (names: readonly string[]) =>
     vi.stubGlobal("performance", {
       getEntriesByType: () => [{ serverTiming: names.map((name) => ({ name })) }],

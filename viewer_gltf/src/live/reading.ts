@@ -1,22 +1,22 @@
-/** How much of a source the server has read for the first view, while the page waits for that. */
+/** Shows how much of a source the server has read, while the page waits for the first view. */
 
-/** What the server says of the page where it reads a source still: see `isReading`. */
+/** Name in the server timing of the page while the server is still reading the source: see `isReading`. */
 const NAME = "stereocell-reading";
-/** Pause between two questions, ms. */
+/** Pause between two requests for the progress, ms. */
 const EACH_MS = 500;
 
-/** Whether the server was reading a source when it sent this page. */
+/** Returns whether the server was reading a source when it sent this page. */
 export function isReading(): boolean {
   const [page] = performance.getEntriesByType("navigation") as PerformanceNavigationTiming[];
   return page?.serverTiming?.some(({ name }) => name === NAME) === true;
 }
 
-/** The words for a share, 0..1. */
+/** Returns the text for a share, 0..1. */
 export function wordsOfReading(share: number): string {
   return share < 1 ? `Reading the source: ${Math.floor(100 * share)} %` : "Opening the first view";
 }
 
-/** Shows how much has been read until the job is done. */
+/** Shows how much has been read until the job is done, and returns the job's result. */
 export async function whileReading<T>(
   root: string,
   job: Promise<T>,
@@ -43,6 +43,6 @@ async function askShare(root: string): Promise<number | null> {
     const { share } = await (await fetch(new URL("/reading", root))).json();
     return typeof share === "number" ? share : null;
   } catch {
-    return null; // the job reports that the server has gone
+    return null; // the job itself reports that the server can't be reached
   }
 }

@@ -1,20 +1,20 @@
-/** Watches the build behind the page: shows how far it is, and each newer view of the specimen. */
+/** Watches the build of the page's source: shows its progress, and each newer view of the specimen. */
 import type { LiveHost } from "../bundle/live_host";
 import { BuildFeed } from "./build_feed";
 import type { BuildState } from "./build_state";
 import { ViewFollower } from "./follow_views";
 import { ProgressLine } from "./progress_line";
 
-/** Time between two looks whether frames are late, ms; the build rests for half a second each time. */
+/** Time between two checks for late frames, ms; the build pauses for half a second each time. */
 const LOOK_MS = 250;
 
 export type BuildWatch = Readonly<{
   live: LiveHost;
-  /** Those of `ViewFollower`. */
+  /** Passed to `ViewFollower`: `root`, `shown` and `show`. */
   root: string;
   shown: string;
   show: (base: string) => Promise<void>;
-  /** Whether the picture moves now, and its frames are late. */
+  /** Returns whether the view is moving and its frames are late. */
   isLate: () => boolean;
 }>;
 
@@ -32,7 +32,7 @@ export function watchBuild({ live, root, shown, show, isLate }: BuildWatch): voi
   });
   const looks = setInterval(() => {
     const mayRest = now?.mayControl === true && now.doing === "building";
-    // a hidden page draws no frame that could be late
+    // A hidden page does not draw frames, so none can be late.
     if (mayRest && !document.hidden && isLate()) feed.rest();
   }, LOOK_MS);
 }

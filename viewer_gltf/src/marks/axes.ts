@@ -1,17 +1,17 @@
-/** The specimen's axes: their letters, and where they lead as an eye sees them. Pure. */
+/** The specimen's axes: their letters, and their directions as an eye sees them. Pure. */
 import { type Matrix4, Vector3 } from "three";
 import type { Sides } from "../bundle/generated/bundle";
 import { type Vec3, withPart } from "../math/vec3";
 
-/** A line through the specimen: `ends` are the letters where `direction` leads to, and opposite. */
+/** A line through the specimen; `ends` are the letters at its end along `direction`, and at the opposite end. */
 export type Axis = Readonly<{
   direction: Vec3;
   ends: readonly [string, string | null];
-  /** Where `direction` leads, for a screen reader. */
+  /** The name of `direction` for a screen reader. */
   word: string;
 }>;
 
-/** The lattice's axes, or where a patient's sides are; in the colours' order. */
+/** Returns the axes of the lattice of voxels, or of a patient's sides if they are known; in the order of AXIS_COLORS. */
 export function axesOf(sides: Sides | undefined): readonly Axis[] {
   if (sides === undefined) {
     return (["x", "y", "z"] as const).map((name, i) => ({
@@ -29,10 +29,10 @@ export function axesOf(sides: Sides | undefined): readonly Axis[] {
 }
 
 /**
- * The specimen's axes as the eye sees them: unit vectors, x to the right, y up, z to the eye. Pure.
+ * Returns the specimen's axes in the eye's frame: unit vectors with x to the right, y up and z towards the eye.
  *
- * @param head from the eye to the room
- * @param specimen from um to the room
+ * @param head from the eye to the scene
+ * @param specimen from um to the scene
  */
 export function axesSeen(
   head: Matrix4,

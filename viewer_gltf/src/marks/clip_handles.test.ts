@@ -17,11 +17,11 @@ const BOX: Box = { min: [100, -300, 50], max: [900, -100, 150] };
 const CLIP: Clip = { box: BOX, plane: { normal: [0, 0, 1], offset_um: 120 } };
 
 describe("the handles", () => {
-  it("are none where nothing is cut", () => {
+  it("do not exist if nothing is cut", () => {
     expect(handlesOf({ box: null, plane: null }, SPECIMEN)).toEqual([]);
   });
 
-  it("lie in the middle of the box's faces, and on and before the plane", () => {
+  it("lie at the centres of the box's faces, on the plane and in front of it", () => {
     const at = new Map(handlesOf(CLIP, SPECIMEN).map(({ id, position }) => [id, position]));
     expect(at.size).toBe(8);
     expect(at.get("x-min")).toEqual([100, -200, 100]);
@@ -31,7 +31,7 @@ describe("the handles", () => {
     expect(at.get("plane-tip")).toEqual([500, -200, 120 + armOf(SPECIMEN)]);
   });
 
-  it("lie on the isolated tile, however large the box is", () => {
+  it("lie on the isolated tile, even if the box is larger", () => {
     const tile: Box = { min: [500, -400, 0], max: [1000, 0, 200] };
     const at = new Map(handlesOf({ box: BOX, plane: null }, tile).map((h) => [h.id, h.position]));
     expect(at.get("x-min")).toEqual([500, -200, 100]);
@@ -39,34 +39,34 @@ describe("the handles", () => {
     expect(at.get("y-min")).toEqual([700, -300, 100]);
   });
 
-  it("are not moved to a tile beside which the box lies", () => {
+  it("are not moved to an isolated tile that the box does not overlap", () => {
     const beside: Box = { min: [950, -400, 0], max: [1000, 0, 200] };
     expect(boxWithin(BOX, beside)).toBe(BOX);
   });
 });
 
 describe("the marks of the cut that a page opens with", () => {
-  it("wait until somebody points at the picture", () => {
+  it("are hidden until a user points at the view", () => {
     const nothing = markedClip(CLIP, CLIP, false);
     expect(handlesOf(nothing, SPECIMEN)).toEqual([]);
     expect(markedClip(CLIP, CLIP, true)).toBe(CLIP);
   });
 
-  it("show at once where the cut was moved", () => {
+  it("show at once after the cut was moved", () => {
     const moved: Clip = { ...CLIP, box: null };
     expect(markedClip(moved, CLIP, false)).toBe(moved);
   });
 });
 
-describe("the handle that a ray means", () => {
-  /** So far beside the middle of z-max, seen from 1000 um before it. */
+describe("the handle at which a ray points", () => {
+  /** A ray that passes the handle z-max at an angle, from 1000 um in front of it. */
   const rayAt = (angle: number): Ray => ({
     origin: [500, -200, 1150],
     direction: [Math.sin(angle), 0, -Math.cos(angle)],
   });
   const handles = handlesOf({ box: BOX, plane: null }, SPECIMEN);
 
-  it("is the one within the tolerance of what points, whatever the distance", () => {
+  it("is the one within the pointer's tolerance, at any distance", () => {
     for (const tolerance of Object.values(TOLERANCE_RAD)) {
       expect(pickHandle(rayAt(0.99 * tolerance), handles, tolerance)).toBe("z-max");
       expect(pickHandle(rayAt(1.01 * tolerance), handles, tolerance)).toBeNull();
@@ -74,12 +74,12 @@ describe("the handle that a ray means", () => {
     expect(TOLERANCE_RAD.gaze).toBeGreaterThan(TOLERANCE_RAD.mouse);
   });
 
-  it("is not one behind the eye", () => {
+  it("is not behind the eye", () => {
     const away: Ray = { origin: [500, -200, 1150], direction: [0, 0, 3] };
     expect(pickHandle(away, handles, 0.5)).toBeNull();
   });
 
-  it("is the nearer by angle of two", () => {
+  it("is the one at the smaller angle", () => {
     const ray: Ray = { origin: [500, -200, 5000], direction: [0, 0.1, -5000] };
     expect(pickHandle(ray, handles, 1)).toBe("z-max");
   });
@@ -88,7 +88,7 @@ describe("the handle that a ray means", () => {
 describe("a drag", () => {
   const atX = (x: number): Ray => ({ origin: [x, -200, 3000], direction: [0, 0, -2] });
 
-  it("brings the face to the ray, and no other", () => {
+  it("moves only the dragged face to the ray", () => {
     expect(dragHandle("x-min", atX(321), CLIP, SPECIMEN)).toEqual({
       type: "set-clip",
       clip: { box: { ...BOX, min: [321, -300, 50] }, plane: CLIP.plane },
@@ -123,7 +123,7 @@ describe("a drag", () => {
     expect(turned.clip.plane?.offset_um).toBeCloseTo(500);
   });
 
-  it("of what is not there, or along the ray, does nothing", () => {
+  it("does nothing for a handle that does not exist, or along the ray", () => {
     expect(dragHandle("x-min", atX(0), { box: null, plane: null }, SPECIMEN)).toBeNull();
     expect(dragHandle("plane-tip", atX(0), { box: BOX, plane: null }, SPECIMEN)).toBeNull();
     expect(dragHandle("z-max", atX(500), CLIP, SPECIMEN)).toBeNull();

@@ -1,6 +1,6 @@
 /**
- * The handles of clip box and plane: where they are, what a drag does; and which handle of all, the
- * lamps' too, a ray means. Pure.
+ * The handles of clip box and clip plane: their positions, and the result of a drag. Also finds the handle, including
+ * those of lamps, at which a ray points. Pure.
  */
 import { Vector3 } from "three";
 import type { Box } from "../math/box";
@@ -30,23 +30,23 @@ export type ClipHandle = Readonly<{ id: ClipHandleId; position: Vec3 }>;
 export type HandleId = ClipHandleId | LampHandleId;
 export type Handle = Readonly<{ id: HandleId; position: Vec3 }>;
 
-/** Angle around a handle's middle within which a ray means it, radians, by the pointer. */
+/** Largest angle between a ray and a handle that it points at, radians, by the kind of pointer. */
 export const TOLERANCE_RAD = {
   mouse: 1.3 * HANDLE_RADIUS,
   touch: 2.2 * HANDLE_RADIUS,
-  /** And a hand's ray: both tremble. */
+  /** Also for a hand's ray; head and hand both tremble. */
   gaze: 2.8 * HANDLE_RADIUS,
 } as const;
 export type Pointing = keyof typeof TOLERANCE_RAD;
 
-/** Length of the plane's arm, as a share of the longest edge of what is shown. */
+/** Length of the plane's arm, as a share of the longest edge of the shown box. */
 const ARM = 0.2;
 
 export function armOf({ min, max }: Box): number {
   return ARM * Math.max(...AXES.map((i) => max[i] - min[i]));
 }
 
-/** The clip box as far as it lies in what is shown; itself if it lies beside that. */
+/** Returns the part of the clip box within the shown box; the whole clip box if they do not overlap. */
 export function boxWithin(box: Box, shown: Box): Box {
   const min = AXES.map((i) => Math.max(box.min[i], shown.min[i]));
   const max = AXES.map((i) => Math.min(box.max[i], shown.max[i]));
@@ -54,7 +54,7 @@ export function boxWithin(box: Box, shown: Box): Box {
   return { min: [min[0], min[1], min[2]], max: [max[0], max[1], max[2]] };
 }
 
-/** All handles of the clip. `shown`: box of what is shown, um: the specimen, or the isolated tile. */
+/** Returns all handles of the clip. `shown` is the box of the specimen or of the isolated tile, um. */
 export function handlesOf({ box, plane }: Clip, shown: Box): readonly ClipHandle[] {
   const found: ClipHandle[] = [];
   if (box !== null) {
@@ -72,14 +72,14 @@ export function handlesOf({ box, plane }: Clip, shown: Box): readonly ClipHandle
 const NOTHING_CUT: Clip = { box: null, plane: null };
 
 /**
- * The clip whose marks show. Those of the cut that a page opens with would lie over what it opens:
- * they wait until somebody points at the picture, or moves the cut.
+ * Returns the clip whose marks show. Marks of the cut with which a page opens would cover what the cut reveals. They
+ * show only after a user points at the view or moves the cut.
  */
 export function markedClip(clip: Clip, opening: Clip, isPointedAt: boolean): Clip {
   return clip === opening && !isPointedAt ? NOTHING_CUT : clip;
 }
 
-/** The handle that the ray (um) passes at the smallest angle, within a tolerance. */
+/** Returns the handle at the smallest angle from the ray (um); null if no handle is within the tolerance. */
 export function pickHandle(
   ray: Ray,
   handles: readonly Handle[],
@@ -98,7 +98,7 @@ export function pickHandle(
   return picked;
 }
 
-/** The clip after dragging a handle to a ray (um); null: no change. */
+/** Returns the action for dragging a handle to a ray (um); null if nothing changes. */
 export function dragHandle(id: ClipHandleId, ray: Ray, clip: Clip, shown: Box): Action | null {
   if (id === "plane-middle") return changePlane(clip, (plane) => slidePlane(plane, ray, shown));
   if (id === "plane-tip") {
@@ -115,7 +115,7 @@ export function changePlane(
   return changed === plane ? null : { type: "set-clip", clip: { box, plane: changed } };
 }
 
-/** @param change gets the box as far as it is shown */
+/** @param change receives the part of the box that is shown */
 export function changeFace(
   { box, plane }: Clip,
   id: BoxHandleId,
@@ -127,7 +127,7 @@ export function changeFace(
   const seen = boxWithin(box, shown);
   const place = change(seen, { axis, side })[side][axis];
   if (place === seen[side][axis]) return null;
-  // the faces that nobody touches stay where they are, also outside of what is shown
+  // The other faces stay where they are, also outside the shown box.
   const corner: [number, number, number] = [...box[side]];
   corner[axis] = place;
   return { type: "set-clip", clip: { box: { ...box, [side]: corner }, plane } };

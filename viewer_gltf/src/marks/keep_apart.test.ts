@@ -14,19 +14,19 @@ function overlaps(a: LabelBox, b: LabelBox): boolean {
 }
 
 describe("labels in the scene", () => {
-  it("stay where they are as long as none lies over another", () => {
+  it("stay where they are if they do not overlap", () => {
     expect(keepApart([box(0, 0), box(5, 0), box(0, 2)])).toEqual([0, 0, 0]);
     expect(keepApart([])).toEqual([]);
   });
 
-  it("give way to those before them, away from their own points", () => {
+  it("move away from their own points if they overlap earlier labels", () => {
     const [first, up, down] = keepApart([box(0, 0), box(1, 0.5), box(2, 0.3, false)]);
     expect(first).toBe(0);
     expect(up).toBeGreaterThan(0.5);
     expect(down).toBeLessThan(-1.3);
   });
 
-  it("are all clear of one another, however many lie at one place", () => {
+  it("never overlap, however many lie at one place", () => {
     const boxes = Array.from({ length: 12 }, (_, i) =>
       box((i * 7) % 5, ((i * 3) % 4) / 2, i % 3 !== 0, 3 + (i % 3), 1 + (i % 2)),
     );

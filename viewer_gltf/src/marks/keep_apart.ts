@@ -1,25 +1,25 @@
-/** Labels that would lie over one another: the later ones give way, up or down. Pure. */
+/** Moves labels that would overlap. The later one of two moves up or down. Pure. */
 
-/** In lines of a label, y up: all labels' lines are of one height to the eye. */
+/** A label's box in lines, y up. The lines of all labels look equally high. */
 export type LabelBox = Readonly<{
   /** The lower left corner. */
   x: number;
   y: number;
   width: number;
   height: number;
-  /** Where it goes to from its point. */
+  /** Whether the label moves up, away from its point; otherwise it moves down. */
   isAbove: boolean;
 }>;
 
-/** Between two labels, lines. */
+/** Gap between two labels, lines. */
 const GAP = 0.15;
 
-/** How far each has to go, lines up, so that none lies over one before it. */
+/** Returns how far each label has to move up, in lines, so that it does not overlap an earlier one. */
 export function keepApart(boxes: readonly LabelBox[]): readonly number[] {
   const placed: LabelBox[] = [];
   return boxes.map((box) => {
     let y = box.y;
-    // each step leaves one behind that it will not meet again
+    // Each step passes one earlier label, which it can't meet again.
     for (let step = 0; step <= placed.length; step++) {
       const met = placed.find(
         (other) =>

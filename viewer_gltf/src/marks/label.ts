@@ -1,4 +1,4 @@
-/** Text in the scene that faces the eye and keeps its angular size; drawn anew only when it differs. */
+/** Text in the scene that faces the eye and keeps its angular size. It is drawn again only when the text changes. */
 import {
   CanvasTexture,
   LinearFilter,
@@ -10,14 +10,14 @@ import {
 import type { LabelBox } from "./keep_apart";
 import { LABEL_HEIGHT, lengthAt, MARKS_ORDER, type Sight } from "./style";
 
-/** Pixels of the canvas to a line: enough for a headset and for a phone's dense screen. */
+/** Pixels of the canvas for each line; enough for a headset and for a phone's dense screen. */
 const LINE_PX = 56;
 const TEXT_PX = 40;
 const PAD_PX = 14;
 
-/** Where the label lies to its point: `above`, `below`, or `aside` (to the right and above). */
+/** Position of a label relative to its point: `above`, `below`, or `aside` (to the right and above). */
 export type Side = "above" | "below" | "aside";
-/** Where the point lies: share of the width from the left, lines above the lower or upper edge. */
+/** Position of the point: share of the width from the left, and lines above the lower (0) or upper (1) edge. */
 const POINTS = {
   above: { share: 0.5, edge: 0, lines: -0.45 },
   below: { share: 0.5, edge: 1, lines: 0.45 },
@@ -26,11 +26,11 @@ const POINTS = {
 
 export class Label {
   readonly sprite: Sprite;
-  /** How often it was drawn. */
+  /** How often the text was drawn. */
   draws = 0;
   private readonly canvas = document.createElement("canvas");
   private readonly texture = new CanvasTexture(this.canvas);
-  /** The text that was written last. */
+  /** The text that was drawn last. */
   text = "";
   private lines = 0;
 
@@ -55,7 +55,7 @@ export class Label {
     this.sprite.visible = false;
   }
 
-  /** One line, or several with \n between them; empty: no label. */
+  /** Shows a text of one line, or of several with \n between them. An empty text hides the label. */
   write(text: string): void {
     this.sprite.visible = text !== "";
     if (text === this.text || text === "") return;
@@ -63,7 +63,7 @@ export class Label {
     this.draw(text.split("\n"));
   }
 
-  /** At a point, um. */
+  /** Places the label at a point, um. */
   place(point: Vector3, { eye_um, textZoom }: Sight): void {
     if (!this.sprite.visible) return;
     const line = lengthAt(point, { eye_um, zoom: textZoom }, this.height_rad);
@@ -78,7 +78,7 @@ export class Label {
     this.sprite.center.set(share, edge + (lines - up_lines) / Math.max(1, this.lines));
   }
 
-  /** Where it was placed, to an eye with these axes. */
+  /** Returns the label's box as an eye with these axes sees it, in lines. */
   boxFrom({ eye_um }: Pick<Sight, "eye_um">, right: Vector3, up: Vector3): LabelBox {
     const { position, scale, center } = this.sprite;
     const line = scale.y / Math.max(1, this.lines);
@@ -89,7 +89,7 @@ export class Label {
     return { x, y, width, height, isAbove: this.side !== "below" };
   }
 
-  /** Farther from its point, by so many lines up. */
+  /** Moves the label up from its usual position, by a number of lines. */
   shift(up_lines: number): void {
     this.turnTo(this.side, up_lines);
   }
@@ -102,7 +102,7 @@ export class Label {
     const widest = Math.max(...lines.map((line) => context.measureText(line).width));
     this.canvas.width = Math.ceil(widest + 2 * PAD_PX);
     this.canvas.height = LINE_PX * lines.length;
-    context.font = font; // a canvas of another size has forgotten it
+    context.font = font; // changing the canvas's size resets its font
     context.fillStyle = "rgb(11 13 18 / 0.78)";
     context.beginPath();
     context.roundRect(0, 0, this.canvas.width, this.canvas.height, PAD_PX);
@@ -112,7 +112,7 @@ export class Label {
     lines.forEach((line, i) => {
       context.fillText(line, PAD_PX, (i + 0.54) * LINE_PX);
     });
-    this.texture.dispose(); // its size on the GPU is fixed
+    this.texture.dispose(); // a texture on the GPU can't change its size
     this.texture.needsUpdate = true;
     this.lines = lines.length;
     this.draws++;

@@ -16,7 +16,7 @@ import {
   withinReach,
 } from "./lamp_handles";
 
-/** Its middle is at 500, -200, 100, its longest edge 1000. */
+/** The specimen's bounds, um: the centre is at 500, -200, 100, and the longest edge is 1000. */
 const SPECIMEN: Box = { min: [0, -400, 0], max: [1000, 0, 200] };
 const after = (...actions: Action[]) => actions.reduce(reduce, initialState(sampleManifest(1)));
 const TRACED: Action = { type: "set", id: "mode", value: "traced" };
@@ -39,7 +39,7 @@ function expectAt(found: Vec3 | undefined, wanted: Vec3): void {
 const degrees = (angle: number) => (angle * Math.PI) / 180;
 
 describe("the lamps' handles", () => {
-  it("are there in the traced picture, when they are asked for, of the lamps that are on", () => {
+  it("show only with path tracing, while lamps are shown, and for lamps that are on", () => {
     expect(LAMP_HANDLES).toHaveLength(LAMPS);
     const idsOf = (state: ViewerState) => lampHandles(state, SPECIMEN).map(({ id }) => id);
     expect(idsOf(after(SHOWN))).toEqual([]);
@@ -49,7 +49,7 @@ describe("the lamps' handles", () => {
     expect(idsOf(after(TRACED, SHOWN, lit))).toEqual(["lamp-0", "lamp-2"]);
   });
 
-  it("lie where the lamps are: in longest edges from the specimen's middle", () => {
+  it("lie where the lamps are, which is given in longest edges from the specimen's centre", () => {
     const [{ position }] = lampHandles(after(TRACED, SHOWN, put(0, -0.9, 0.5, 1.1)), SPECIMEN);
     expectAt(position, [-400, 300, 1200]);
   });
@@ -59,14 +59,14 @@ describe("a lamp that is dragged", () => {
   const EYE: Vec3 = [0, 0, 3];
   const slide = (from: Vec3, ray: Ray, wasBeside = false) => slideOnSphere(from, ray, wasBeside);
 
-  it("lies on the ray and on its sphere, on the side on which it was", () => {
+  it("lies on the ray and on its sphere, and stays on the same side", () => {
     expectAt(slide([0, 0, 1], towards(EYE, [0.6, 0, 0.8]))?.place, [0.6, 0, 0.8]);
     expectAt(slide([0, 0, -1], towards(EYE, [0.6, 0, -0.8]))?.place, [0.6, 0, -0.8]);
-    // through the middle: either end of the diameter
+    // A ray through the centre meets both ends of the diameter.
     expectAt(slide([0.1, 0, 0.9], towards(EYE, [0, 0, 0]))?.place, [0, 0, Math.hypot(0.1, 0.9)]);
   });
 
-  it("around the eye lies ahead", () => {
+  it("lies ahead of the eye if the sphere surrounds the eye", () => {
     const inside: Vec3 = [0, 0, 2];
     for (const from of [
       [0, 3, 0],
@@ -78,8 +78,8 @@ describe("a lamp that is dragged", () => {
     }
   });
 
-  it("goes over the rim that the eye sees, and then along it", () => {
-    const eye: Vec3 = [0, 0, 2]; // a sphere of 1 has its rim 60 degrees from the eye's side
+  it("moves across the rim that the eye sees, and then along it", () => {
+    const eye: Vec3 = [0, 0, 2]; // the rim of a sphere of radius 1 is 60 degrees away from the eye's direction
     const at = (angle: number, x: number, y: number): Vec3 => [
       x * Math.sin(angle),
       y * Math.sin(angle),
@@ -96,12 +96,12 @@ describe("a lamp that is dragged", () => {
     const back = slide(at(rim + TIP_RAD, 0, 1), towards(eye, at(degrees(90), 0, 1)), true);
     expectAt(back?.place, at(degrees(90), 0, 1));
     expect(back?.isBeside).toBe(false);
-    // and from behind to the front
+    // The lamp also moves from behind to the front.
     expectAt(slide(at(degrees(90), 0, 1), up)?.place, at(rim - TIP_RAD, 0, 1));
     expectAt(slide(at(rim - TIP_RAD, 0, 1), right, true)?.place, at(rim - TIP_RAD, 1, 0));
   });
 
-  it("rolls behind and back by rays that go out and in, however fine their steps are", () => {
+  it("moves behind the sphere and back when rays go out and in, for any step size", () => {
     for (const step of [0.01, 0.13, 0.7, 3]) {
       let lamp: Vec3 = [0, 0, 1];
       let wasBeside = false;
@@ -113,7 +113,7 @@ describe("a lamp that is dragged", () => {
         wasBeside = slid.isBeside;
       };
       const goOutAndIn = () => {
-        for (let angle = 10; angle < 30; angle += step) pull(angle); // the rim: 23.6 degrees
+        for (let angle = 10; angle < 30; angle += step) pull(angle); // the rim is at 23.6 degrees
         for (let angle = 30; angle > 10; angle -= step) pull(angle);
       };
       goOutAndIn();
@@ -125,12 +125,12 @@ describe("a lamp that is dragged", () => {
     }
   });
 
-  it("stays where no place is meant: in the very middle, or straight away from it", () => {
+  it("stays if the ray defines no place: for a lamp at the centre, or a ray straight away from it", () => {
     expect(slide([0, 0, 0], towards(EYE, [0, 1, 0]))).toBeNull();
     expect(slide([0, 1, 0], towards(EYE, [0, 0, 9]))).toBeNull();
   });
 
-  it("is moved by the action, in um and out of them, and only while it is there", () => {
+  it("is moved by the action, with um converted to edges and back, and only while it has a handle", () => {
     const state = after(TRACED, SHOWN, put(0, 0, 0, 1));
     const ray = towards([500, -200, 3100], [1100, -200, 900]); // 0.6, 0, 0.8
     const drag = dragLamp("lamp-0", ray, state, SPECIMEN, false);
@@ -140,7 +140,7 @@ describe("a lamp that is dragged", () => {
     const moved = reduce(state, drag.action);
     expect(moved.trace.lamps.slice(1)).toEqual(state.trace.lamps.slice(1));
     const again = dragLamp("lamp-0", ray, moved, SPECIMEN, false);
-    expect(again).toEqual({ action: null, isBeside: false }); // it begins no picture anew
+    expect(again).toEqual({ action: null, isBeside: false }); // path tracing does not restart
     expect(dragLamp("lamp-1", ray, state, SPECIMEN, false)).toBeNull(); // off
     const hidden = reduce(state, { type: "set", id: "trace/lamps", value: false });
     expect(dragLamp("lamp-0", ray, hidden, SPECIMEN, false)).toBeNull();
@@ -148,11 +148,11 @@ describe("a lamp that is dragged", () => {
 });
 
 describe("the lamps' reach", () => {
-  it("leaves what lies within it", () => {
+  it("leaves places within it unchanged", () => {
     expect(withinReach([1, -2, 3])).toEqual([1, -2, 3]);
   });
 
-  it("is kept at the same distance", () => {
+  it("limits a place without changing its distance", () => {
     expectAt(withinReach([4, 0, 0]), [3, Math.sqrt(3.5), Math.sqrt(3.5)]);
     expectAt(withinReach([-4, 0, 1]), [-3, 0, Math.sqrt(8)]);
     const most = LAMP_REACH * Math.sqrt(3);
@@ -174,14 +174,14 @@ describe("the lamps' reach", () => {
     }
   });
 
-  it("lets a drag go on where the sphere is cut by it", () => {
+  it("lets a drag continue where the sphere extends beyond it", () => {
     const state = after(TRACED, SHOWN, put(0, 2, 0, 3));
-    const beyond: Vec3 = [3.5, 0.5, Math.sqrt(0.5)]; // as far from the middle
+    const beyond: Vec3 = [3.5, 0.5, Math.sqrt(0.5)]; // at the same distance from the centre
     const [x, y, z] = beyond.map((v, i) => 1000 * v + [500, -200, 100][i]);
     const drag = dragLamp("lamp-0", towards([9500, -200, 100], [x, y, z]), state, SPECIMEN, false);
     if (drag?.action == null) throw new Error("no drag");
     const lamp = reduce(state, drag.action).trace.lamps[0];
-    const share = Math.sqrt(4 / 0.75); // of the other two: they make up for it
+    const share = Math.sqrt(4 / 0.75); // factor by which the other two coordinates grow
     expectAt([lamp.x, lamp.y, lamp.z], [LAMP_REACH, 0.5 * share, Math.sqrt(0.5) * share]);
   });
 });

@@ -1,6 +1,6 @@
 /**
- * The lamps of the path-traced picture as handles: where they are, and where a drag brings one. A
- * lamp slides on the sphere round the specimen's middle on which it is. Pure.
+ * Handles for the lamps of path tracing: their positions, and the result of dragging one. A lamp slides on the sphere
+ * around the specimen's centre on which it lies. Pure.
  */
 import { Vector3 } from "three";
 import type { Box } from "../math/box";
@@ -13,30 +13,30 @@ import type { ViewerState } from "../state/viewer_state";
 
 export const LAMP_HANDLES = ["lamp-0", "lamp-1", "lamp-2"] as const;
 export type LampHandleId = (typeof LAMP_HANDLES)[number];
-/** um, world. */
+/** A handle; its position is in um, world. */
 export type LampHandle = Readonly<{ id: LampHandleId; position: Vec3 }>;
 /** The part of the state that places lamps. */
 export type LitState = Pick<ViewerState, "mode" | "areLampsShown" | "trace">;
 
 /**
- * Angle, radians, by which a ray beside the sphere tips a lamp over the rim that its origin sees:
- * when the ray comes back it has the lamp on the other side.
+ * Angle, radians, by which a lamp moves beyond the sphere's rim, as the eye sees it, while the ray passes beside the
+ * sphere. When the ray comes back to the sphere, the lamp is on its other side.
  */
 export const TIP_RAD = (4 * Math.PI) / 180;
 
-/** `isBeside`: the ray went beside the sphere. */
+/** A point on the sphere; `isBeside` is true if the ray passes beside the sphere. */
 export type Slid = Readonly<{ place: Vec3; isBeside: boolean }>;
-/** `action` null: the lamp is there already. */
+/** The result of a drag; `action` is null if the lamp is already there. */
 export type LampDrag = Readonly<{ action: Action | null; isBeside: boolean }>;
 
-/** Least move of a lamp, in lengths of the specimen: a hand at rest leaves the picture. */
+/** Smallest move of a lamp, in longest edges of the specimen. Smaller ones do not restart path tracing. */
 const SAME = 1e-9;
 
 export function isLampHandle(id: string): id is LampHandleId {
   return (LAMP_HANDLES as readonly string[]).includes(id);
 }
 
-/** All that can be taken hold of: of the lamps that are on, where they really are. */
+/** Returns the handles of all lamps that are on, at the lamps' real positions; none while lamps are not shown. */
 export function lampHandles(state: LitState, specimen: Box): readonly LampHandle[] {
   if (!isTraced(state) || !state.areLampsShown) return [];
   const { middle, edge_um } = roundOf(specimen);
@@ -49,9 +49,9 @@ export function lampHandles(state: LitState, specimen: Box): readonly LampHandle
 }
 
 /**
- * The result of dragging a lamp to a ray (um); null: it is not there, or the ray gives no place.
+ * Returns the result of dragging a lamp to a ray (um); null if the lamp has no handle, or the ray defines no place.
  *
- * @param wasBeside whether the ray before, of the same drag, went beside the sphere
+ * @param wasBeside whether the previous ray of the same drag passed beside the sphere
  */
 export function dragLamp(
   id: LampHandleId,
@@ -75,10 +75,9 @@ export function dragLamp(
 }
 
 /**
- * Where a point comes to lie on its sphere about 0 when it follows a ray. Of the two places at which
- * the ray meets the sphere the one nearer to the point counts. Beside the sphere it is the rim that is
- * seen from the ray's origin: the point goes over it to the other side, once, and then along it.
- * null: the ray gives no place.
+ * Returns the place to which a point moves on its sphere around 0 when it follows a ray; null if the ray defines none.
+ * If the ray meets the sphere at two places, the one nearer to the point counts. If it passes beside the sphere, the
+ * point moves near the rim as seen from the ray's origin: first across the rim to the other side, then along it.
  */
 export function slideOnSphere(
   from: Vec3,
@@ -91,7 +90,7 @@ export function slideOnSphere(
   const radius = point.length();
   if (!(radius > 0)) return null;
   const nearest = -eye.dot(ahead);
-  const half = Math.sqrt(radius ** 2 - (eye.lengthSq() - nearest ** 2)); // NaN: beside it
+  const half = Math.sqrt(radius ** 2 - (eye.lengthSq() - nearest ** 2)); // NaN if the ray passes beside the sphere
   const ends = [nearest - half, nearest + half]
     .filter((t) => t > 0)
     .map((t) => eye.clone().addScaledVector(ahead, t));
@@ -100,7 +99,7 @@ export function slideOnSphere(
   return place && { place: place.toArray(), isBeside: ends.length === 0 };
 }
 
-/** @param eye outside of the sphere */
+/** @param eye a point outside the sphere */
 function atTheRim(
   point: Vector3,
   eye: Vector3,
@@ -110,9 +109,9 @@ function atTheRim(
   const radius = point.length();
   const towards = eye.clone().normalize();
   const aside = ahead.clone().addScaledVector(towards, -ahead.dot(towards));
-  if (!(aside.length() > 1e-6)) return null; // straight away from the sphere
+  if (!(aside.length() > 1e-6)) return null; // the ray leads straight to the sphere's centre or away from it
   aside.normalize();
-  const rim = Math.acos(Math.min(1, radius / eye.length())); // where a ray touches the sphere
+  const rim = Math.acos(Math.min(1, radius / eye.length())); // angle at which a ray from the eye touches the sphere
   const wasBehind = towards.angleTo(point) > rim;
   const isBehind = wasBehind === wasBeside;
   const angle = Math.max(0, rim + (isBehind ? TIP_RAD : -TIP_RAD));
@@ -122,8 +121,8 @@ function atTheRim(
 }
 
 /**
- * As far from the middle, and within the lamps' reach along each axis: what lies beyond it is cut off,
- * and goes to the other axes.
+ * Returns a place at the same distance from the centre, within the lamps' reach along each axis. Coordinates beyond the
+ * reach are limited to it, and the other coordinates grow to keep the distance.
  */
 export function withinReach(place: Vec3): Vec3 {
   const far2 = place[0] ** 2 + place[1] ** 2 + place[2] ** 2;

@@ -1,4 +1,4 @@
-/** The eye in the specimen's space, for marks that are as large to it from near and from afar. Pure. */
+/** Finds the eye in the specimen's space, for marks that look equally large at every distance. Pure. */
 import { Matrix4, type PerspectiveCamera, Vector3 } from "three";
 import { type Sight, STEREO_TEXT, screenZoom } from "./style";
 
@@ -10,8 +10,8 @@ export const NO_SIGHT: Sight = {
 };
 
 /**
- * @param head pose of the head or of the mono camera, room
- * @param specimen from um to the room
+ * @param head pose of the head or of the mono camera, in the scene
+ * @param specimen from um to the scene
  * @param screen the flat picture, with its height in CSS pixels; null in stereo
  */
 export function sightOf(
@@ -29,7 +29,7 @@ export function sightOf(
   };
 }
 
-/** In the middle of a flat picture. */
+/** CSS pixels for each radian at the centre of a flat screen. */
 function pxPerRad(camera: PerspectiveCamera, height_px: number): number {
   return (camera.projectionMatrix.elements[5] * height_px) / 2;
 }

@@ -1,6 +1,6 @@
 /**
- * How marks look: lengths are angles, so that a mark is as large to the eye near by as far away, and
- * what covers a mark lets it through as a ghost. On a flat screen an angle is so many pixels.
+ * The style of marks. Their lengths are angles, so that a mark looks equally large at every distance; on a flat screen
+ * an angle is a number of pixels. A mark behind a surface shows faintly.
  */
 import {
   BackSide,
@@ -21,7 +21,7 @@ import {
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 
 const RADIANS = Math.PI / 180;
-/** Render order: after the marched volumes, which lie over everything else. */
+/** Render order of marks: after the marched volumes, which are drawn after everything else. */
 export const MARKS_ORDER = 1001;
 /** Opacity of marks behind a surface, 0..1. */
 const GHOST = 0.35;
@@ -33,7 +33,7 @@ export const MEASURE = 0xffd24a;
 export const PLANE = 0xc792ff;
 const RIM = 0x0b0d12;
 const RIM_SCALE = 1.3;
-/** x, y, z: distinct to colour-blind eyes too (after Okabe & Ito), and labelled. */
+/** Colours of x, y and z. Colour-blind users can tell them apart, too (after Okabe & Ito), and axes are labelled. */
 export const AXIS_COLORS = ["#e8743b", "#35b98c", "#6cb8f0"] as const;
 
 /** Radii of marks in a headset, radians. */
@@ -45,27 +45,27 @@ export const LINE_RADIUS = 0.06 * RADIANS;
 /** Height of a label's line in a headset, radians. */
 export const LABEL_HEIGHT = 1.15 * RADIANS;
 
-/** Height of a label's line on a flat screen, CSS pixels; all else in proportion. */
+/** Height of a label's line on a flat screen, CSS pixels; other sizes of marks are in proportion. */
 export const LABEL_PX = 20;
 
-/** Where the eye is, um; where up is to it, of any length; how much larger than in a headset angles are. */
+/** The eye's position in um, its up direction of any length, and factors to the angles of marks in a headset. */
 export type Sight = Readonly<{
   eye_um: Vector3;
   up: Vector3;
   /** Factor to the angles of marks. */
   zoom: number;
-  /** Factor to the angles of labels: in stereo a phone's few pixels need large letters. */
+  /** Factor to the angles of labels; letters are larger in stereo, since a phone has few pixels for each eye. */
   textZoom: number;
 }>;
 /** Factor to the angles of labels in stereo: their letters are 32 mm high at 1 m, as on the panel. */
 export const STEREO_TEXT = 2.25;
 
-/** Of a flat screen: how much larger angles are, at so many CSS pixels to a radian. */
+/** Returns the factor to angles on a flat screen with a number of CSS pixels for each radian. */
 export function screenZoom(px_per_rad: number): number {
   return LABEL_PX / px_per_rad / LABEL_HEIGHT;
 }
 
-/** The length, um, that is seen under an angle at a point. */
+/** Returns the length, um, that appears under an angle at a point. */
 export function lengthAt(
   point: Vector3,
   { eye_um, zoom }: Pick<Sight, "eye_um" | "zoom">,
@@ -85,14 +85,14 @@ export function markMesh(
   return ghosted(new Mesh(geometry, material), new Mesh(geometry, material.clone()));
 }
 
-/** A part of a mark; `geometry` is the mark's from here on. */
+/** A part of a mark, which takes over `geometry` and disposes of it. */
 export type Piece = Readonly<{
   geometry: BufferGeometry;
   color: ColorRepresentation;
   opacity?: number;
 }>;
 
-/** One mark of several parts, each in its colour: a mark of many meshes is drawn as often. */
+/** Merges parts with their own colours into one mark, which takes one draw call instead of one for each part. */
 export function markOf(pieces: readonly Piece[]): MarkMesh {
   const geometries = pieces.map(({ geometry, color, opacity = 1 }) => {
     const rgba = [...new Color(color).toArray(), opacity];
@@ -117,13 +117,13 @@ export function markLine(
 
 const MATERIAL = { transparent: true, depthWrite: false, toneMapped: false, fog: false } as const;
 
-/** The same once more, faintly, where it lies behind something. */
+/** Adds a faint copy of a mark, which shows where the mark is behind something. */
 function ghosted<
   T extends Mesh<BufferGeometry, MeshBasicMaterial> | Line<BufferGeometry, LineBasicMaterial>,
 >(mark: T, ghost: T): T {
   ghost.material.depthFunc = GreaterDepth;
   ghost.material.opacity *= GHOST;
-  ghost.material.color = mark.material.color; // one colour, by either material
+  ghost.material.color = mark.material.color; // a change of either material's colour changes both
   for (const each of [mark, ghost]) {
     each.renderOrder = MARKS_ORDER;
     each.frustumCulled = false;
@@ -132,7 +132,7 @@ function ghosted<
   return mark;
 }
 
-/** A dark rim round a mark, which may lie on something as bright. */
+/** Adds a dark rim around a mark, which may lie on something equally bright. */
 export function rimmed(mark: MarkMesh): MarkMesh {
   const material = new MeshBasicMaterial({ color: RIM, side: BackSide, ...MATERIAL });
   const rim = new Mesh(mark.geometry, material);
@@ -143,7 +143,7 @@ export function rimmed(mark: MarkMesh): MarkMesh {
   return mark;
 }
 
-/** Free what the meshes and lines below an object hold; shared geometry may go more than once. */
+/** Disposes of geometry and materials of all meshes and lines below an object; shared ones may be disposed of twice. */
 export function disposeMarks(root: Object3D): void {
   root.traverse((object) => {
     const { geometry, material } = object as Partial<MarkMesh>;

@@ -1,11 +1,11 @@
-/** The length of the specimen that a pixel of the picture shows. Pure. */
+/** Computes the length of the specimen that a pixel of the screen shows. Pure. */
 import type { PerspectiveCamera, Vector3 } from "three";
 import { umPerPixel } from "../math/round_length";
 
 /**
- * Um to a CSS pixel at the depth of a point of the room.
+ * Returns um per CSS pixel at the depth of a point of the scene.
  *
- * @param height_px of the picture
+ * @param height_px height of the view, CSS pixels
  */
 export function umPerPixelAt(
   focus: Vector3,

@@ -4,7 +4,7 @@ import { embedOrigin, faultOfState } from "./frame_port";
 const CHANNELS = ["dna", "cd8"];
 
 describe("a state that a page sends to the viewer in its frame", () => {
-  it("is taken with any part of what the notebook has", () => {
+  it("may contain any of the fields that a notebook has", () => {
     const states = [
       {},
       { link: "#mode=off" },
@@ -37,8 +37,8 @@ describe("a state that a page sends to the viewer in its frame", () => {
   });
 });
 
-describe("the page that may drive the viewer", () => {
-  it("is the one whose origin the address names", () => {
+describe("the page that may control the viewer", () => {
+  it("has the origin that the address names", () => {
     expect(embedOrigin("?embed=https://lab.example")).toBe("https://lab.example");
     expect(embedOrigin("?embed=https://lab.example:8443/page")).toBe("https://lab.example:8443");
     for (const search of ["", "?embed=", "?embed=lab", "?embed=javascript:1", "?embed=*"]) {

@@ -1,11 +1,11 @@
 /**
- * The way between this page and the page that holds it in a frame. Only that page is heard, and only if it is of the
- * origin that the address names (`?embed=https://lab.example`). What it sends is checked before anything is done.
+ * Exchanges messages with the page that holds this page in a frame. It accepts messages only from that page, and only if
+ * its origin is the one in the address (`?embed=https://lab.example`). Each message is checked before it has an effect.
  */
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Asked } from "./view_sharing";
 
-/** A name in every message, both ways: a page may hear others, too. */
+/** Name in each message in both directions, since a page may also receive messages of other senders. */
 const NAME = "stereocell";
 const COLOUR = /^#[0-9a-f]{6}$/i;
 
@@ -40,7 +40,7 @@ function isRecord(value: unknown): value is Readonly<Record<string, unknown>> {
   return typeof value === "object" && value !== null && !Array.isArray(value);
 }
 
-/** The first fault of an object's fields, in words; null: there is none. */
+/** Returns the first fault of an object's fields as a text; null if there is none. */
 function faultOfFields(
   name: string,
   value: unknown,
@@ -58,7 +58,7 @@ function faultOfFields(
   return null;
 }
 
-/** Why a state can't be shown; null: it can. @param channels the ids of the bundle's channels */
+/** Returns the reason why a state can't be shown; null if it can. @param channels the IDs of the bundle's channels */
 export function faultOfState(state: unknown, channels: readonly string[]): string | null {
   if (!isRecord(state)) return `state: expected an object, found ${JSON.stringify(state)}`;
   for (const [key, value] of Object.entries(state)) {
@@ -90,7 +90,7 @@ function faultOfPart(key: string, value: unknown, channels: readonly string[]): 
   }
 }
 
-/** The origin whose page may drive this one; null: the address names none. */
+/** Returns the origin whose page may control this one; null if the address names none. */
 export function embedOrigin(search: string): string | null {
   const asked = new URLSearchParams(search).get("embed");
   if (asked === null || !URL.canParse(asked)) return null;
@@ -98,7 +98,7 @@ export function embedOrigin(search: string): string | null {
   return protocol === "https:" || protocol === "http:" ? origin : null;
 }
 
-/** To the page that the address names; null: it names none. */
+/** Returns a port to the page of the origin in the address; null if the address names none. */
 export function portToHolder(search: string, { channels }: Manifest): FramePort | null {
   const origin = embedOrigin(search);
   const ids = channels.map(({ id }) => id);
@@ -107,7 +107,7 @@ export function portToHolder(search: string, { channels }: Manifest): FramePort 
 
 type Message = Readonly<{ type: string }>;
 
-/** This way to the page around has the methods of a MessagePort, which the part that shares the view expects. */
+/** A port to the surrounding page, with the methods of a MessagePort that ViewSharing uses. */
 export class FramePort {
   constructor(
     private readonly origin: string,
@@ -128,7 +128,7 @@ export class FramePort {
     });
   }
 
-  /** Pictures are for a notebook that is saved, and go nowhere else. */
+  /** Sends a message. Pictures are not sent, since only a saved notebook needs them. */
   postMessage(message: Message): void {
     if (message.type === "picture") return;
     this.holder.postMessage({ source: NAME, ...message }, this.origin);

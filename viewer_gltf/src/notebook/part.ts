@@ -1,4 +1,4 @@
-/** The view shared with a notebook, or with the page that holds this one in a frame. Its code loads where one does. */
+/** The part of the viewer that shares the view with a notebook or a surrounding page. Its code loads only for those. */
 import { pageAddress } from "../bundle/address";
 import type { Part, PartDefinition, PartHost, Tap } from "../host/part";
 import type { Port, ViewSharing } from "./view_sharing";
@@ -17,7 +17,7 @@ class NotebookPart implements Part {
     this.view = new ViewSharing(this.host, port, code);
   }
 
-  /** The way to who holds this page; null: nobody does, or wants to share its view. */
+  /** Returns a port to the notebook or page that contains this page; null if there is none, or if it shares no view. */
   private async findPort(): Promise<Port | null> {
     const port = globalThis.stereocellHost?.port;
     if (port !== undefined) return port;

@@ -11,7 +11,7 @@ const CHANNEL = {
 } as unknown as ChannelState;
 const RANGE = [100, 300] as const;
 
-test("a channel is told in the source's values", () => {
+test("the window of a shared channel is in values of the source", () => {
   expect(sharedChannel(CHANNEL, RANGE)).toEqual({
     visible: true,
     color: "#ff0000",
@@ -20,7 +20,7 @@ test("a channel is told in the source's values", () => {
   });
 });
 
-test("what is asked for, and is not so, is done", () => {
+test("requested settings that differ from the present ones become actions", () => {
   expect(channelActions(CHANNEL, { visible: false, window: [150, 300] }, RANGE)).toEqual([
     { type: "show", channel: "CD31", shown: false },
     { type: "window", channel: "CD31", window: [0.25, 1] },
@@ -31,7 +31,7 @@ test("what is asked for, and is not so, is done", () => {
   ]);
 });
 
-test("what comes back as it was told changes nothing", () => {
+test("settings that come back as they were sent change nothing", () => {
   const third = { ...CHANNEL, opacity: 1 / 3, window: [1 / 3, 2 / 3] } as unknown as ChannelState;
   expect(channelActions(third, sharedChannel(third, RANGE), RANGE)).toEqual([]);
 });

@@ -1,6 +1,6 @@
 /**
- * Shares the view with the notebook or the page that holds this one. It sends each change through a
- * port, and shows the changes that come back. Lengths are micrometres of the specimen, windows are values of the source.
+ * Shares the view with the notebook or the page that contains this one. It sends each change through a port, and shows
+ * the changes that it receives. Lengths are in um of the specimen, and windows are in values of the source.
  */
 import type { Manifest } from "../bundle/generated/bundle";
 import type { PartHost, Tap } from "../host/part";
@@ -19,11 +19,11 @@ export type SharedChannel = Readonly<{
   /** `#rrggbb`. */
   color: string;
   opacity: number;
-  /** In the source's values. */
+  /** Low and high end, in values of the source. */
   window: readonly [number, number];
 }>;
 type SharedView = Readonly<{ eye_um: Vec3; target_um: Vec3 }>;
-/** `tile`, `channel` and `object`: absent where nobody has looked, as of a point that Python names. */
+/** A picked point; `tile`, `channel` and `object` are absent if they were not determined, as for a point from Python. */
 export type Picked = Readonly<{
   point_um: Vec3;
   tile?: string;
@@ -36,7 +36,7 @@ export type Shared = Readonly<{
   view: SharedView;
   picked: Picked | null;
 }>;
-/** What comes from Python may leave things out. */
+/** A state that Python requests. Fields that are left out stay as they are. */
 export type Asked = Readonly<{
   link?: string;
   channels?: Readonly<Record<string, Partial<SharedChannel>>>;
@@ -46,17 +46,17 @@ export type Asked = Readonly<{
 
 /** Least time between two messages, ms. */
 const BETWEEN_MS = 200;
-/** Without a change until a picture is made, ms. */
+/** Time without a change after which a picture is made, ms. */
 const REST_MS = 1200;
 const POSTER_PX = 960;
-/** Least light samples of a pixel: a picture with fewer is noise. */
+/** Smallest number of light samples of a pixel for a picture; with fewer it is too noisy. */
 const MIN_SAMPLES = 64;
-/** Digits of what is told: more are noise of the camera. */
+/** Significant digits of shared numbers; more digits would only show rounding noise of the camera. */
 const DIGITS = 6;
 
 const rounded = (value: number) => Number(value.toPrecision(DIGITS));
 
-/** What a bundle's channel looks like, in Python's words. Pure. */
+/** Returns a channel's settings in the form that Python uses. Pure. */
 export function sharedChannel(
   channel: ChannelState,
   [low, high]: readonly [number, number],
@@ -71,7 +71,7 @@ export function sharedChannel(
   };
 }
 
-/** The actions that make a channel look as asked. What is left out, or as it is, stays. Pure. */
+/** Returns the actions that apply the requested settings of a channel which differ from the present ones. Pure. */
 export function channelActions(
   channel: ChannelState,
   asked: Partial<SharedChannel>,
@@ -94,7 +94,7 @@ export function channelActions(
 
 const isSame = (a: unknown, b: unknown) => JSON.stringify(a) === JSON.stringify(b);
 
-/** A way for messages: to a notebook, or to the page that holds this one in a frame. */
+/** A port for messages: to a notebook, or to the page that holds this one in a frame. */
 export type Port = Readonly<{
   addEventListener: (type: "message", listener: (event: MessageEvent) => void) => void;
   postMessage: MessagePort["postMessage"];
@@ -102,11 +102,11 @@ export type Port = Readonly<{
 
 export class ViewSharing {
   private picked: Picked | null = null;
-  /** What both sides know. */
+  /** The last state that was sent or received. */
   private known: Partial<Shared> = {};
   private timer = 0;
   private rest = 0;
-  /** Of the picture that was sent. */
+  /** Link to the view of the last picture that was sent. */
   private pictured = "";
   private readonly manifest: Manifest;
 
@@ -117,7 +117,7 @@ export class ViewSharing {
   ) {
     const { display } = host;
     this.manifest = host.bundle.manifest;
-    host.viewpoint.stopTurning(); // it would be news without end
+    host.viewpoint.stopTurning(); // each frame of a turning specimen would be a change to send
     host.changed.subscribe(() => this.note());
     host.drawn.subscribe(() => this.note());
     port.addEventListener("message", ({ data }: MessageEvent) => {
@@ -132,7 +132,7 @@ export class ViewSharing {
     void this.look(ray);
   }
 
-  /** Something may have changed. */
+  /** Schedules a message, because the view may have changed. */
   private note(): void {
     if (this.timer === 0) this.timer = window.setTimeout(() => this.tell(), BETWEEN_MS);
   }
@@ -177,7 +177,7 @@ export class ViewSharing {
     this.rest = window.setTimeout(() => void this.picture(), REST_MS);
   }
 
-  /** Show what Python asks for, and tell what it has come to. */
+  /** Shows the state that Python requests, and sends the resulting state. */
   private follow(asked: Asked): void {
     const { host } = this;
     this.known = { ...this.known, ...(asked as Partial<Shared>) };
@@ -233,12 +233,12 @@ export class ViewSharing {
     this.note();
   }
 
-  /** Of the view at rest, for the saved notebook. */
+  /** Sends a picture of the view at rest, for the saved notebook. */
   private async picture(): Promise<void> {
     const { display } = this.host;
     await display.settled();
     const { link } = this.shared;
-    // what is news will be told in a moment, and rest again
+    // If the view has changed since the last message, the next message schedules another picture.
     if (link === this.pictured || link !== this.known.link || this.host.isInRoom) return;
     if (isTraced(this.host.state) && display.snapshot().traced.samples < MIN_SAMPLES) {
       this.rest = window.setTimeout(() => void this.picture(), REST_MS);

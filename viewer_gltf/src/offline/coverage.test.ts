@@ -12,11 +12,11 @@ const keysOf = (...names: readonly string[]) => new Set(names.map((name) => keyO
 const coverage = (come: readonly string[], kept = come) =>
   coverageOf(["a", "b"], [LAYER], come.map(file), keysOf(...kept)).tiles;
 
-it("counts every tile while all of them were shown at the same level", () => {
+it("counts every tile if all tiles were shown at the same level", () => {
   expect(coverage(["a/2", "b/2"])).toBe(2);
 });
 
-it("counts the tiles alone that have the finest level that was shown anywhere", () => {
+it("counts only tiles that are kept at the finest level that was shown anywhere", () => {
   expect(coverage(["a/2", "b/2", "a/1"])).toBe(1);
   expect(coverage(["a/2", "b/2", "a/1", "a/0", "b/1"])).toBe(1);
   expect(coverage(["a/2", "b/2", "a/1", "b/1"])).toBe(2);
@@ -38,11 +38,11 @@ it("expects the finest level of a tile that has fewer levels", () => {
   expect(coverageOf(["a", "b"], [short], fine.map(file), keysOf(...fine)).tiles).toBe(2);
 });
 
-it("wants nothing of a layer that nobody has seen", () => {
+it("ignores a layer that was never shown", () => {
   expect(coverageOf(["a", "b"], [LAYER], [], new Set()).tiles).toBe(2);
 });
 
-it("promises every place, or names what is kept and why not more", () => {
+it("announces that every place is kept, or how much is kept and why not more", () => {
   expect(coverageText({ tiles: 10 }, 10)).toMatch(/^Ready offline: /);
   const more = "Each tile that you look at from near is kept, too.";
   expect(coverageText({ tiles: 3 }, 10)).toBe(

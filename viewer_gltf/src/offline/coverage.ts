@@ -1,6 +1,6 @@
 /**
- * How much of a specimen a visit without a network would show. A place counts if it is kept at the finest level that
- * was shown anywhere: that is what a reader expects to find there. Pure.
+ * Computes how much of a specimen a visit without a network would show. A tile counts if it is kept at the finest level
+ * that was shown anywhere, since a user expects to find that level everywhere. Pure.
  */
 import { type Asked, keyOf } from "../bundle/request_log";
 
@@ -17,6 +17,8 @@ export type Coverage = Readonly<{
 }>;
 
 /**
+ * Counts the tiles that are kept in all layers.
+ *
  * @param come the requests that were answered
  * @param kept keys of the requests that need no network
  */
@@ -34,7 +36,7 @@ export function coverageOf(
     const finest = layer
       .map(({ levels }) => levels.findIndex((asked) => hasAll(asked, shown)))
       .filter((index) => index >= 0);
-    if (finest.length === 0) continue; // nobody has seen any of it
+    if (finest.length === 0) continue; // the layer was never shown
     const wanted = Math.min(...finest);
     for (const { tile, levels } of layer) {
       const asked = levels[Math.min(wanted, levels.length - 1)] ?? [];
@@ -47,7 +49,7 @@ export function coverageOf(
 const MORE = "Each tile that you look at from near is kept, too.";
 const BY_VIEW = "This host sends volumes for each view, so volumes need the network.";
 
-/** The sentences that the page announces about a coverage: what is kept, and why not more. */
+/** Returns the sentences that the page announces: how much is kept, and why not more. */
 export function coverageText({ tiles, isByView = false }: Coverage, of: number): string {
   if (tiles === of)
     return "Ready offline: every place opens without a network, as you have seen it.";

@@ -1,4 +1,4 @@
-/** Keeps what was shown for a visit without a network, and announces how far that goes. */
+/** Keeps everything that was shown for a visit without a network, and announces how much that is. */
 
 import type { Bundle } from "../bundle/load";
 import { allCome, keyOf } from "../bundle/request_log";
@@ -10,10 +10,10 @@ import { OfflineLayers } from "./layers";
 import { Keeping } from "./register";
 import { isKept } from "./request_plan";
 
-/** Time between two looks at what has come since, ms. */
+/** Time between two checks for new files, ms. */
 const LOOK_MS = 2000;
 
-/** Addresses of files of the bundle that are kept, though the page has not asked for them. */
+/** Returns addresses of files of the bundle that are kept although the page has not requested them. */
 function alsoKept(bundle: Bundle): readonly string[] {
   const usdz = arAddress(bundle);
   return usdz !== null && isKept(bundle.manifest.usdz ?? null) ? [usdz] : [];
@@ -26,7 +26,7 @@ export class KeepOffline {
   /** Whether this visit, or one before, has announced how much is kept. */
   private hasSaid: boolean;
   private isReady: boolean;
-  /** Requests that the worker was asked to keep a second time. */
+  /** Requests that the worker had missed and was asked to keep. */
   private readonly missed = new Set<string>();
 
   private constructor(
@@ -39,8 +39,9 @@ export class KeepOffline {
   }
 
   /**
-   * Starts after the first picture. From then on the page's root has `data-offline`: "partly" once all that was shown and can be
-   * kept is kept, "ready" once that is every place, "refused" where the browser keeps nothing, as on a full disk.
+   * Starts after the first frame. From then on the page's root element has `data-offline`. It is "partly" once everything
+   * that was shown and can be kept is kept, and "ready" once every tile is kept. It is "refused" if the browser keeps
+   * nothing, for example on a full disk.
    */
   static async start(host: PartHost): Promise<void> {
     const keeping = await Keeping.start();
@@ -50,7 +51,7 @@ export class KeepOffline {
       return;
     }
     const part = new KeepOffline(host, keeping);
-    const look = () => part.look().catch(() => undefined); // the network went: the next look may do
+    const look = () => part.look().catch(() => undefined); // the network failed; the next check may succeed
     await look();
     setInterval(look, LOOK_MS);
   }
@@ -67,7 +68,7 @@ export class KeepOffline {
     this.report(coverage);
   }
 
-  /** "later": the worker fetches what it has missed; null: some of what was shown can't be kept. */
+  /** Returns how much is kept; "later" while the worker fetches missed files; null if some shown files can't be kept. */
   private async coverage(): Promise<Coverage | "later" | null> {
     const { host, keeping } = this;
     const layers = await this.layers.now();
@@ -85,7 +86,7 @@ export class KeepOffline {
     }
     if (missed.length > 0) return null;
     const { manifest, bricks } = host.bundle;
-    // a host that sends bricks by view is needed for each view
+    // Bricks are sent for each view, so that the host is needed for each view.
     if (bricks !== undefined && showsVolumes(host.state)) return { tiles: 0, isByView: true };
     const tiles = manifest.tiles.map(({ id }) => id);
     return coverageOf(tiles, layers, come, kept);
@@ -95,7 +96,7 @@ export class KeepOffline {
     const { length } = this.host.bundle.manifest.tiles;
     const isReady = coverage?.tiles === length;
     document.documentElement.dataset.offline = isReady ? "ready" : "partly";
-    // The first state and "Ready" are announced; an announcement for each further tile would disturb.
+    // Only the first state and "ready" are announced; an announcement for each further tile would disturb.
     if (coverage !== null && (!this.hasSaid || (isReady && !this.isReady))) {
       this.host.service("page")?.say(coverageText(coverage, length));
       this.hasSaid = true;

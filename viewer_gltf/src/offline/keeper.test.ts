@@ -60,13 +60,13 @@ async function prepare() {
 describe("the keeper", () => {
   afterEach(() => vi.unstubAllGlobals());
 
-  it("keeps what the page had asked for before it was served", async () => {
+  it("keeps files that the page requested before the worker served it", async () => {
     const { keeper, kept, url, key } = await prepare();
     await keeper.adopt(PAGE, [{ url, range: null }]);
     expect(textOf(kept.get(key)?.body as ArrayBuffer)).toBe("voxels");
   });
 
-  it("keeps what came by it before it knew the bundle's files", async () => {
+  it("keeps files that it passed on before it knew the bundle's files", async () => {
     const { keeper, kept, ask, url, key } = await prepare();
     expect(await ask(url)).toBe("voxels");
     expect(kept.has(key)).toBe(false);
@@ -74,7 +74,7 @@ describe("the keeper", () => {
     expect(textOf(kept.get(key)?.body as ArrayBuffer)).toBe("voxels");
   });
 
-  it("names the requests that need no network: those that are kept, and those that are no file of the bundle", async () => {
+  it("names the requests that need no network: for kept files, and for files outside the bundle", async () => {
     const { keeper, url } = await prepare();
     const asked = [url, `${BUNDLE}manifest.json`, `${BUNDLE}values?at=1`, "https://other/file"];
     const areKept = () =>
@@ -87,10 +87,10 @@ describe("the keeper", () => {
     expect(await areKept()).toEqual([false, true, true, true]);
     await keeper.adopt(PAGE, [{ url, range: null }]);
     expect(await areKept()).toEqual([true, true, true, true]);
-    expect(await keeper.areKept(PAGE, [{ url, range: "bytes=0-1" }])).toEqual([true]); // in the whole file
+    expect(await keeper.areKept(PAGE, [{ url, range: "bytes=0-1" }])).toEqual([true]); // a part of a kept file
   });
 
-  it("answers from what it has kept, whatever the host has by then", async () => {
+  it("answers with the kept file, even if the host has changed it", async () => {
     const { keeper, ask, url } = await prepare();
     await keeper.adopt(PAGE, [{ url, range: null }]);
     vi.stubGlobal("fetch", () => Promise.reject(new TypeError("no network")));

@@ -1,8 +1,7 @@
 /**
- * Answers requests from the network and the store, so that what was seen once shows without a
- * network. Files of a bundle are kept under the SHA-256 that its files.json gives them, parts of
- * them under their range too: a file that changes on the host is another entry, and never a wrong
- * picture.
+ * Answers requests from the network and the store, so that everything that was shown once also shows without a
+ * network. Files of a bundle are kept under the SHA-256 in its files.json, and parts of files also under their range.
+ * A file that changes on the host thus becomes a new entry, and an old one is never shown in its place.
  */
 import { checkFile, fileAddress } from "../bundle/fetch";
 import type { FileRef } from "../bundle/generated/bundle";
@@ -10,18 +9,18 @@ import type { Asked } from "../bundle/request_log";
 import { isKept, type Keys, ownBundle, type Plan, planFor } from "./request_plan";
 import type { Store } from "./store";
 
-/** Longest wait for the network's answer, ms: then a kept copy is used. */
+/** Longest wait for the network's answer, ms; after that a kept copy is used. */
 const PATIENCE_MS = 5000;
 const FIRST_SERVER_FAULT = 500;
 
 type Listed = Readonly<Record<string, Omit<FileRef, "path">>>;
-/** Work that goes on after the answer was given. */
+/** Registers work that continues after the answer was sent. */
 export type Later = (work: Promise<unknown>) => void;
 
 export class Keeper {
-  /** The files of each bundle, as the manifest that was last seen has them; null: unknown. */
+  /** The files of each bundle by the manifest that was read last; null if unknown. */
   private readonly listed = new Map<string, Promise<Listed | null>>();
-  /** Answered while a bundle's files were unknown, as just after this worker took the page over. */
+  /** Requests that were answered while a bundle's files were unknown, as just after this worker took over the page. */
   private readonly unlisted = new Map<string, Asked>();
 
   constructor(
@@ -52,7 +51,7 @@ export class Keeper {
     }
   }
 
-  /** Keep the viewer's own files, and drop those of an older one. */
+  /** Keeps the viewer's own files, and drops those of an older version. */
   async keepViewer(names: readonly string[]): Promise<void> {
     const keepOne = async (name: string) => {
       const key = this.keys.asset(name);
@@ -67,18 +66,18 @@ export class Keeper {
     await this.store.retain(this.keys.asset(""), (key) => wanted.has(key));
   }
 
-  /** Keep what a page has loaded before this worker began to serve it. */
+  /** Keeps the files that a page has loaded before this worker began to serve it. */
   async adopt(page: string, asked: readonly Asked[]): Promise<void> {
     const works: Promise<unknown>[] = [];
     const later: Later = (work) => works.push(work.catch(() => undefined));
-    const seen = { cache: "force-cache" } as const; // it may still be in the browser's own cache
+    const seen = { cache: "force-cache" } as const; // the file may still be in the browser's own cache
     const bare = page.split(/[?#]/)[0];
     if (!this.store.has(this.keys.page)) {
       later(fetch(bare, seen).then((response) => this.keep(this.keys.page, response)));
     }
     const base = ownBundle(page);
     if (base !== null && (await this.listedOf(base)) === null) {
-      // known at once as coming: what the page asks for from now on waits for it, and is kept
+      // The promise is stored at once: later requests of the page wait for the list, and their files are kept.
       const request = new Request(fileAddress(base, "manifest.json"), { cache: "no-cache" });
       const listed = this.networkFirst(this.keys.manifest(base), request, later)
         .then(async (response) =>
@@ -94,7 +93,7 @@ export class Keeper {
       const plan = this.plan(url, page);
       if (plan.kind !== "file") continue;
       const headers: HeadersInit = range === null ? {} : { Range: range };
-      // One after another: the page may still be loading.
+      // The files are fetched one after another, because the page may still be loading.
       const answer = this.answer(plan, new Request(url, { ...seen, headers }), later);
       await answer.then((response) => response.body?.cancel()).catch(() => undefined);
     }
@@ -106,7 +105,7 @@ export class Keeper {
     return this.store.has(this.keys.page);
   }
 
-  /** For each request of a page whether its answer needs no network, or is none of the bundle's files. */
+  /** Returns for each request of a page whether it needs no network; true also if it is not for a file of the bundle. */
   areKept(page: string, asked: readonly Asked[]): Promise<readonly boolean[]> {
     return Promise.all(asked.map(({ url, range }) => this.isKept(this.plan(url, page), range)));
   }
@@ -122,7 +121,7 @@ export class Keeper {
     return [null, range].some((part) => this.store.has(this.keys.file(base, sha256, part)));
   }
 
-  /** Resolves once what was used and kept is written down. */
+  /** Resolves once the ledger of kept files and their last uses is written. */
   save(): Promise<void> {
     return this.store.save();
   }
@@ -134,7 +133,7 @@ export class Keeper {
       return response;
     });
     if (kept === null) return coming;
-    later(coming.catch(() => undefined)); // may come after the answer, for the next time
+    later(coming.catch(() => undefined)); // may arrive after the kept copy was sent, and then serves the next visit
     const orKept = coming.then(
       (response) => (response.status >= FIRST_SERVER_FAULT ? kept : response),
       () => kept,
@@ -183,17 +182,17 @@ export class Keeper {
     }
     const ref = Object.hasOwn(listed, path) ? listed[path] : undefined;
     if (ref === undefined || !isKept({ path, ...ref })) return fetch(request);
-    const isAskedAnew = request.cache === "reload"; // what was kept has the wrong hash
+    const isAskedAnew = request.cache === "reload"; // the page found a wrong hash in the kept file
     const part =
       range === null ? null : await this.store.get(this.keys.file(base, ref.sha256, range));
     const kept = part ?? (await this.store.get(this.keys.file(base, ref.sha256)));
-    if (kept !== null && !isAskedAnew) return kept; // a whole file answers a range too, as a host may
+    if (kept !== null && !isAskedAnew) return kept; // a whole file may answer a request for a range, as HTTP allows
     const response = await fetch(request);
     if (response.ok) later(this.keepFile(base, { path, ...ref }, range, response.clone()));
     return response;
   }
 
-  /** Keep a file, or a part of it, if it is as in files.json. The page reports any other file. */
+  /** Keeps a file, or a part of it, if it agrees with files.json. The page reports any other file. */
   private async keepFile(
     base: string,
     ref: FileRef,
@@ -214,7 +213,7 @@ export class Keeper {
     await this.store.put(this.keys.file(base, ref.sha256, range), { body, type, range: found });
   }
 
-  /** After a restart of this worker the kept manifest lists them; its absence is not for good. */
+  /** Returns a bundle's files; after a restart of the worker, from the kept manifest. The result null is not stored. */
   private async listedOf(base: string): Promise<Listed | null> {
     let listed = this.listed.get(base);
     if (listed === undefined) {
@@ -228,7 +227,7 @@ export class Keeper {
     return found;
   }
 
-  /** Fetch files.json where it isn't kept, and drop the files that it no longer names. */
+  /** Fetches files.json if it is not kept, and drops files that it no longer lists. */
   private async readListed(base: string, manifest: string): Promise<Listed | null> {
     try {
       const { files } = JSON.parse(manifest) as { files: FileRef };
@@ -244,7 +243,7 @@ export class Keeper {
       await this.store.retain(this.keys.files(base), (each) => hashes.has(this.keys.hashOf(each)));
       return listed;
     } catch {
-      return null; // nothing is kept of a bundle that can't be understood; the page reports why
+      return null; // no file of an unreadable bundle is kept; the page reports the fault
     }
   }
 }

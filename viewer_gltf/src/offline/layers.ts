@@ -1,4 +1,4 @@
-/** The files that a reader can come to from the present view, by tile and level. */
+/** Lists the files that a user may need from the present view on, by tile and level. */
 import { fileAddress } from "../bundle/fetch";
 import type { Channel } from "../bundle/generated/bundle";
 import type { Asked } from "../bundle/request_log";
@@ -10,7 +10,7 @@ import type { VolumeSource } from "../voxels/volume_source";
 import type { Layer, Levels } from "./coverage";
 
 export class OfflineLayers {
-  /** The surfaces of each channel that was shown. */
+  /** The surfaces of each channel that has been shown. */
   private readonly surfaces = new Map<string, Layer>();
 
   constructor(private readonly host: PartHost) {}

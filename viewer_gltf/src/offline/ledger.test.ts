@@ -8,7 +8,7 @@ const LEDGER = new Map([
 ]);
 
 describe("the offline store's ledger", () => {
-  it("drops what was used least recently, and no more than it must", () => {
+  it("drops the least recently used entries, and only as many as necessary", () => {
     expect(totalBytes(LEDGER)).toBe(60);
     expect(outOfRoom(LEDGER, 60)).toEqual([]);
     expect(outOfRoom(LEDGER, 55)).toEqual(["old"]);
@@ -17,11 +17,11 @@ describe("the offline store's ledger", () => {
     expect(outOfRoom(LEDGER, 0)).toEqual(["old", "middle", "new"]);
   });
 
-  it("is the same after it was written and read", () => {
+  it("is the same after writing and reading", () => {
     expect(fromText(toText(LEDGER))).toEqual(LEDGER);
   });
 
-  it("is empty where its text is broken", () => {
+  it("is empty if its text is broken", () => {
     for (const text of ["", "[1", "{}", "[1]"]) expect(fromText(text).size).toBe(0);
   });
 });

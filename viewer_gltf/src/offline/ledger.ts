@@ -1,7 +1,7 @@
 /** The entries of the offline store, and the last use of each. Plain data. */
 
 export type Use = Readonly<{ bytes: number; used_ms: number }>;
-/** By key, in no order. */
+/** Uses by key, not in any order. */
 export type Ledger = ReadonlyMap<string, Use>;
 
 export function totalBytes(ledger: Ledger): number {
@@ -10,7 +10,7 @@ export function totalBytes(ledger: Ledger): number {
   return sum;
 }
 
-/** The keys to drop until at most `limit_bytes` are left: least recently used first. */
+/** Returns the keys to drop so that at most `limit_bytes` are left; the least recently used come first. */
 export function outOfRoom(ledger: Ledger, limit_bytes: number): string[] {
   let excess = totalBytes(ledger) - limit_bytes;
   const dropped: string[] = [];
@@ -27,7 +27,7 @@ export function toText(ledger: Ledger): string {
   return JSON.stringify([...ledger].map(([key, { bytes, used_ms }]) => [key, bytes, used_ms]));
 }
 
-/** An unreadable text is an empty ledger: the store then finds its entries anew. */
+/** Reads a ledger. An unreadable text gives an empty one, and the store then lists its entries again. */
 export function fromText(text: string): Map<string, Use> {
   try {
     const rows = JSON.parse(text) as [string, number, number][];

@@ -1,4 +1,4 @@
-/** A visit without a network, as a part of the viewer. Its code loads after the first picture. */
+/** The part of the viewer for visits without a network. Its code loads after the first frame. */
 import { isHeld } from "../bundle/held_files";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 
@@ -9,7 +9,7 @@ class OfflinePart implements Part {
 
   async afterOverview(): Promise<void> {
     const { bundle } = this.host;
-    // a view of a source that is being built, or a bundle that the page itself has made
+    // Not for a view of a source that is being built, nor for a bundle that the page itself has made.
     if (bundle.live !== undefined || isHeld(bundle.base)) return;
     const { KeepOffline } = await import("./keep_offline");
     await KeepOffline.start(this.host);

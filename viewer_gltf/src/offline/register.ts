@@ -1,29 +1,29 @@
-/** Make the viewer and what it has shown usable without a network, where the browser can. */
+/** Makes the viewer and everything it has shown usable without a network, if the browser supports that. */
 import { type Asked, allAsked } from "../bundle/request_log";
 import { ownBundle } from "./request_plan";
 import type { IsKept, Opened } from "./sw";
 import workerAddress from "./sw?worker&url";
 
-/** Longest time until a worker takes its pages over, ms. */
+/** Longest wait until a worker takes over its pages, ms. */
 const CLAIM_MS = 10_000;
 
-/** Only on a host that browsers trust (https, or this machine), and for bundles of that host. */
+/** Returns whether files can be kept: only on a secure host (https, or this machine), and for bundles of that host. */
 function canKeep(page: string, isSecure: boolean): boolean {
   return /^https?:/.test(page) && isSecure && ownBundle(page) !== null;
 }
 
-/** The way to the service worker that keeps what was shown. */
+/** Sends messages to the service worker, which keeps everything that was shown. */
 export class Keeping {
   private constructor(
     private readonly worker: ServiceWorker,
-    /** Whether the page was opened through the worker, as on a later visit. */
+    /** Whether the worker served the page when it opened, as on a later visit. */
     readonly wasServed: boolean,
   ) {}
 
-  /** Start the service worker; null: this browser keeps nothing for this page. */
+  /** Starts the service worker; null if this browser can't keep files for this page. */
   static async start(): Promise<Keeping | null> {
     const isAble = !import.meta.env.DEV && canKeep(location.href, isSecureContext);
-    // a frame without an origin may not even ask for it
+    // In a frame without an origin, reading `serviceWorker` throws; it is read only if files can be kept.
     const { serviceWorker } = (isAble ? navigator : {}) as {
       serviceWorker?: ServiceWorkerContainer;
     };
@@ -32,7 +32,7 @@ export class Keeping {
     try {
       await serviceWorker.register(workerAddress);
     } catch {
-      return null; // such as where cookies are blocked
+      return null; // for example because cookies are blocked
     }
     const { active } = await serviceWorker.ready;
     await served(serviceWorker);
@@ -40,9 +40,9 @@ export class Keeping {
   }
 
   /**
-   * Hand over what was loaded before the worker took the page over, or has been missed since.
+   * Asks the worker to keep files that were loaded before it took over the page, or that it has missed since.
    *
-   * @param also addresses of files of the bundle that the page has not asked for
+   * @param also addresses of files of the bundle that the page has not requested
    * @returns whether the page would open without a network
    */
   adopt(missed: readonly Asked[] | null, also: readonly string[]): Promise<boolean> {
@@ -56,7 +56,7 @@ export class Keeping {
     });
   }
 
-  /** For each request whether its answer is kept, or is not the bundle's to keep. */
+  /** Returns for each request whether its answer is kept; true also if it is not for a file of the bundle. */
   isKept(asked: readonly Asked[]): Promise<readonly boolean[]> {
     return this.ask<readonly boolean[]>({ type: "is-kept", page: location.href, asked });
   }
@@ -73,11 +73,11 @@ export class Keeping {
   }
 }
 
-/** Resolves once the page's requests pass the worker, or it is clear that they won't. */
+/** Resolves once the worker receives the page's requests, or has not done so within CLAIM_MS. */
 function served(serviceWorker: ServiceWorkerContainer): Promise<void> {
   if (serviceWorker.controller !== null) return Promise.resolve();
   return new Promise((resolve) => {
     serviceWorker.addEventListener("controllerchange", () => resolve(), { once: true });
-    setTimeout(resolve, CLAIM_MS); // a page that was reloaded past its worker is never served
+    setTimeout(resolve, CLAIM_MS); // a forced reload bypasses the worker, which then never serves the page
   });
 }

@@ -6,7 +6,7 @@ const FIXED = ["app.webmanifest", "icon.svg"];
 const plan = (address: string, page: string | null = FOLDER) =>
   planFor(address, FOLDER, page, FIXED);
 
-it("keeps all of a bundle but what is large and drawn by no page", () => {
+it("keeps all files of a bundle except large ones that no page draws", () => {
   const large = MAX_KEPT_USDZ_BYTES + 1;
   expect(isKept({ path: "volumes/a.ktx2", bytes: large })).toBe(true);
   expect(isKept({ path: "specimen.usdz", bytes: large })).toBe(false);
@@ -15,7 +15,7 @@ it("keeps all of a bundle but what is large and drawn by no page", () => {
 });
 
 describe("the answer to a request", () => {
-  it("is the page for its folder and its file, whatever the query", () => {
+  it("is the page for its folder and its file, with any query", () => {
     for (const address of [FOLDER, `${FOLDER}?mode=tile`, `${FOLDER}index.html?x=1`]) {
       expect(plan(address, null)).toEqual({ kind: "page" });
     }
@@ -57,7 +57,7 @@ describe("the answer to a request", () => {
     expect(ownBundle(page)).toBeNull();
     expect(ownBundle(`${FOLDER}?bundle=http://`)).toBeNull();
     expect(ownBundle("blob:https://host/5f0e")).toBeNull();
-    expect(ownBundle(`${FOLDER}?source=x.zarr`)).toBeNull(); // a source is read anew at each visit
+    expect(ownBundle(`${FOLDER}?source=x.zarr`)).toBeNull(); // a source is read again at each visit
     expect(plan("https://far/x/manifest.json", page)).toEqual({ kind: "none" });
     expect(plan(`${FOLDER}manifest.json`, page)).toEqual({ kind: "none" });
   });
@@ -80,7 +80,7 @@ describe("the store's keys", () => {
     for (const key of all) expect(new URL(key).href).toBe(key);
   });
 
-  it("return the hash", () => {
+  it("contain the hash", () => {
     const key = keys.file("https://host/a/?t=/1", "00ff", "bytes=0-9");
     expect(key.startsWith(keys.files("https://host/a/?t=/1"))).toBe(true);
     expect(keys.hashOf(key)).toBe("00ff");

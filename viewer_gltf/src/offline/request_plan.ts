@@ -1,8 +1,8 @@
 /**
- * How the service worker answers a request, by address alone. Pure, so that tests need no worker.
+ * Decides by a request's address alone how the service worker answers it. Pure, so that tests need no worker.
  *
- * Hashed files never change under their name and come from the store first; what may change under
- * its name (the page, the manifest, the icons) comes from the network first.
+ * Files with a hash in their name never change, and come from the store first. Files that may change under the same
+ * name (the page, the manifest, the icons) come from the network first.
  */
 import { bundleAddress, sourceAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
@@ -16,10 +16,10 @@ export type Plan =
   | { kind: "file"; base: string; path: string }
   | { kind: "none" };
 
-/** Largest file for a phone's own viewer of augmented reality that is kept: no page draws it. */
+/** Largest USDZ file that is kept, bytes. It is for a phone's own viewer of augmented reality, and no page draws it. */
 export const MAX_KEPT_USDZ_BYTES = 4 * 1024 * 1024;
 
-/** Whether a bundle's file is kept for a visit without a network; null: there is none. */
+/** Returns whether a bundle's file is kept for a visit without a network; false for null, which means no file. */
 export function isKept(file: Pick<FileRef, "path" | "bytes"> | null): boolean {
   if (file === null) return false;
   return !file.path.endsWith(".usdz") || file.bytes <= MAX_KEPT_USDZ_BYTES;
@@ -29,9 +29,9 @@ const NONE: Plan = { kind: "none" };
 const ASSETS = "assets/";
 const MANIFEST = "manifest.json";
 
-/** The bundle that a page shows, if it lies on the page's own host; otherwise null. */
+/** Returns the address of the bundle that a page shows if it is on the page's own host; otherwise null. */
 export function ownBundle(page: string): string | null {
-  if (!/^https?:/.test(page)) return null; // a worker made from a blob asks too
+  if (!/^https?:/.test(page)) return null; // requests also come from workers that were made from a blob
   try {
     if (sourceAddress(page) !== null) return null;
     const base = bundleAddress(page);
@@ -42,7 +42,7 @@ export function ownBundle(page: string): string | null {
   }
 }
 
-/** The decoded path below a folder, or null if it lies elsewhere. */
+/** Returns the decoded path of a URL below a folder; null if it is elsewhere. */
 function below(folder: string, url: URL): string | null {
   const { origin, pathname } = new URL(folder);
   if (url.origin !== origin || !url.pathname.startsWith(pathname)) return null;
@@ -54,8 +54,10 @@ function below(folder: string, url: URL): string | null {
 }
 
 /**
- * @param folder the viewer's, with a closing slash
- * @param page address of the page that asks; null while it is being opened
+ * Returns how the worker answers a request.
+ *
+ * @param folder the viewer's folder, with a closing slash
+ * @param page address of the page that makes the request; null if the request opens a page
  * @param fixed the viewer's files outside assets/, such as its icons
  */
 export function planFor(
@@ -75,7 +77,7 @@ export function planFor(
   return path === MANIFEST ? { kind: "manifest", base } : { kind: "file", base, path };
 }
 
-/** Addresses under which the store keeps things; none of them is ever fetched. */
+/** Keys of the store. They are addresses that are never fetched. */
 export class Keys {
   constructor(private readonly folder: string) {}
 
@@ -91,7 +93,7 @@ export class Keys {
     return this.make("ledger");
   }
 
-  /** Of the viewer. */
+  /** The key of one of the viewer's own files. */
   asset(name: string): string {
     return this.make("viewer", name);
   }

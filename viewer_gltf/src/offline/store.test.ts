@@ -4,7 +4,7 @@ import { Store } from "./store";
 const LEDGER = "https://host/kept/ledger";
 const KEY = (name: string) => `https://host/kept/${name}`;
 
-/** A Cache in memory, with room for so many bytes. */
+/** A Cache in memory, with room for `room.bytes` bytes. */
 function fakeCache(room: { bytes: number }) {
   const entries = new Map<string, { body: ArrayBuffer; headers: Headers }>();
   return {
@@ -45,7 +45,7 @@ describe("the offline store", () => {
 
   const openStore = (limit_bytes?: number) => Store.open("test", LEDGER, limit_bytes);
 
-  it("answers with what it keeps, parts as parts", async () => {
+  it("returns what it keeps, and parts of files with status 206", async () => {
     const store = await openStore();
     await store.put(KEY("a"), content(5));
     await store.put(KEY("b"), content(3, "bytes 0-2/9"));
@@ -56,7 +56,7 @@ describe("the offline store", () => {
     expect(await store.get(KEY("c"))).toBeNull();
   });
 
-  it("drops what was used least recently, also over a restart", async () => {
+  it("drops the least recently used entries, also after a restart", async () => {
     const first = await openStore(10);
     for (const name of ["a", "b", "c"]) {
       await first.put(KEY(name), content(3));
@@ -69,20 +69,20 @@ describe("the offline store", () => {
     const second = await openStore(10);
     await second.put(KEY("d"), content(3));
     expect(["a", "b", "c", "d"].filter((name) => second.has(KEY(name)))).toEqual(["a", "c", "d"]);
-    await second.put(KEY("e"), content(11)); // more than all of it
+    await second.put(KEY("e"), content(11)); // larger than the whole store
     expect(second.has(KEY("e"))).toBe(false);
     expect(second.has(KEY("d"))).toBe(true);
   });
 
-  it("finds entries that the ledger has lost, with their sizes", async () => {
+  it("finds entries that are missing in the ledger, with their sizes", async () => {
     const first = await openStore(10);
-    await first.put(KEY("a"), content(6)); // and the worker is stopped before it writes
+    await first.put(KEY("a"), content(6)); // the worker stops before it writes the ledger
     const second = await openStore(10);
     await second.put(KEY("b"), content(6));
     expect([second.has(KEY("a")), second.has(KEY("b"))]).toEqual([false, true]);
   });
 
-  it("makes room where the browser refuses, and goes on", async () => {
+  it("makes room if the browser refuses to store more, and continues", async () => {
     const store = await openStore();
     await store.put(KEY("a"), content(3));
     vi.advanceTimersByTime(10);
@@ -92,7 +92,7 @@ describe("the offline store", () => {
     expect(["a", "b", "c"].filter((name) => store.has(KEY(name)))).toEqual(["b"]);
   });
 
-  it("drops what is no longer wanted under a prefix, and nothing else", async () => {
+  it("drops only unwanted entries under a prefix", async () => {
     const store = await openStore();
     for (const name of ["x/1", "x/2", "y/1"]) await store.put(KEY(name), content(1));
     await store.retain(KEY("x/"), (key) => key.endsWith("/2"));

@@ -1,16 +1,16 @@
 /**
- * The files that are kept for use without a network: a Cache of the browser, bounded in size, least
- * recently used first to go. A Cache has neither sizes nor ages: a ledger beside the entries has.
+ * Keeps files for use without a network, in a Cache of the browser with a limited size. The least recently used files
+ * are dropped first. Sizes and times of use are in a ledger, since a Cache does not have them.
  */
 import { fromText, outOfRoom, toText, type Use } from "./ledger";
 
 const LIMIT_BYTES = 512 * 1024 * 1024;
-/** Share of the entries that stays after the browser has refused to store more. */
+/** Share of the kept bytes that stays after the browser has refused to store more. */
 const KEPT_AT_REFUSAL = 0.5;
-/** Pause before the ledger is written, ms: more changes may come. */
+/** Pause before the ledger is written, ms, since more changes may follow. */
 const SAVE_DELAY_MS = 300;
 
-/** `range`: the Content-Range of a part of a file. */
+/** The body of a file; `range` is the Content-Range if it is a part of the file. */
 export type Content = Readonly<{
   body: ArrayBuffer;
   type: string | null;
@@ -39,7 +39,7 @@ export class Store {
     const ledger = new Map<string, Use>();
     for (const { url } of await cache.keys()) {
       if (url === ledgerKey) continue;
-      // An entry that the ledger lost counts as old; its size is in its own headers.
+      // An entry that is missing in the ledger counts as old; its size is in its own headers.
       const bytes = stored.has(url) ? 0 : await sizeOf(cache, url);
       ledger.set(url, stored.get(url) ?? { bytes, used_ms: 0 });
     }
@@ -50,13 +50,13 @@ export class Store {
     return this.ledger.has(key);
   }
 
-  /** What is kept: a part of a file as 206. */
+  /** Returns a kept file, or a kept part of a file with status 206; null if it is not kept. */
   async get(key: string): Promise<Response | null> {
     const use = this.ledger.get(key);
     if (use === undefined) return null;
     const kept = await this.cache.match(key).catch(() => undefined);
     if (kept === undefined) {
-      this.ledger.delete(key); // the browser has made room by itself
+      this.ledger.delete(key); // the browser has deleted the entry by itself
       return null;
     }
     this.ledger.set(key, { ...use, used_ms: Date.now() });
@@ -64,7 +64,7 @@ export class Store {
     return new Response(kept.body, { status: 206, headers: kept.headers });
   }
 
-  /** Keep it if there is room. A browser that refuses is no fault: less works without a network. */
+  /** Keeps a file if there is room. If the browser refuses, that is not a fault; less works without a network then. */
   async put(key: string, { body, type, range }: Content): Promise<void> {
     const bytes = body.byteLength;
     if (bytes > this.limit_bytes) return;
@@ -81,20 +81,20 @@ export class Store {
     }
   }
 
-  /** Drop the entries under a prefix that are no longer wanted. */
+  /** Drops the entries under a prefix that are no longer wanted. */
   async retain(prefix: string, isWanted: (key: string) => boolean): Promise<void> {
     const keys = [...this.ledger.keys()];
     await this.drop(keys.filter((key) => key.startsWith(prefix) && !isWanted(key)));
   }
 
-  /** Resolves once the ledger is written; calls in short order share one writing. */
+  /** Resolves once the ledger is written; calls shortly after one another share one write. */
   save(): Promise<void> {
     this.saving ??= new Promise((resolve) => setTimeout(resolve, SAVE_DELAY_MS))
       .then(() => {
         this.saving = null;
         return this.cache.put(this.ledgerKey, new Response(toText(this.ledger)));
       })
-      .catch(() => undefined); // without it, entries count as old when the worker next starts
+      .catch(() => undefined); // without the ledger, all entries count as old when the worker next starts
     return this.saving;
   }
 

@@ -1,6 +1,6 @@
 /**
- * The service worker: hands the page's requests to the keeper. It serves the viewer's folder, and
- * is built as sw.js beside index.html, with the list of the viewer's files filled in.
+ * The service worker, which passes the page's requests to the keeper. It serves the viewer's folder. The build writes it
+ * as sw.js beside index.html, and inserts the list of the viewer's files.
  */
 import type { Asked } from "../bundle/request_log";
 import { Keeper } from "./keeper";
@@ -8,22 +8,22 @@ import { Keys } from "./request_plan";
 import { Store } from "./store";
 
 /**
- * A page's report of its first picture. The answer, on the port, comes once all is
- * kept: whether the page would open without a network.
+ * A page's message that it has drawn its first frame. Once all files are kept, the worker answers on the port whether
+ * the page would open without a network.
  */
 export type Opened = Readonly<{
   type: "opened";
   page: string;
-  /** Of the bundle, before this worker answered. */
+  /** Requests for the bundle's files before this worker answered them. */
   asked: readonly Asked[];
-  /** Addresses of all that the page has loaded, the viewer's own parts among them. */
+  /** Addresses of everything that the page has loaded, including the viewer's own parts. */
   loaded: readonly string[];
 }>;
 
-/** A page's question for each request whether its answer needs no network; the answers come on the port. */
+/** A page's question whether the answer to each request needs no network. The worker answers on the port. */
 export type IsKept = Readonly<{ type: "is-kept"; page: string; asked: readonly Asked[] }>;
 
-// TypeScript's types of pages and of service workers exclude each other; this is what is used here.
+// TypeScript's types of pages and of service workers exclude each other. These are the types that are used here.
 type Extendable = Event & { waitUntil(work: Promise<unknown>): void };
 type FetchRequest = Extendable & {
   request: Request;
@@ -44,16 +44,16 @@ type ServiceWorkerScope = {
 };
 const worker = self as unknown as ServiceWorkerScope;
 
-/** Relative to the viewer's folder; filled in by the build. */
+/** The viewer's files, relative to its folder; the build inserts them. */
 const FILES: readonly string[] = JSON.parse("__VIEWER_FILES__");
-/** Large, and of use to few bundles: kept once it was needed. */
+/** Whether a file is large and needed by few bundles; such files are kept only after a page has loaded one. */
 const isOptional = (name: string) => name.includes("basis");
 const isHashed = (name: string) => name.startsWith("assets/");
 
 const folder = worker.registration.scope;
 const keys = new Keys(folder);
 
-/** Null where the browser keeps nothing, as when storage is forbidden. */
+/** The keeper; null if the browser keeps no files, for example because storage is forbidden. */
 const opened: Promise<Keeper | null> = Store.open(`stereocell ${folder}`, keys.ledger).then(
   (store) =>
     new Keeper(
@@ -100,7 +100,7 @@ worker.addEventListener("fetch", (event) => {
   event.respondWith(answered);
   const finish = async () => {
     await answered.catch(() => undefined);
-    while (works.length > 0) await Promise.allSettled(works.splice(0)); // works may add works
+    while (works.length > 0) await Promise.allSettled(works.splice(0)); // work may add more work
     await (await opened)?.save();
   };
   event.waitUntil(finish());
@@ -108,9 +108,9 @@ worker.addEventListener("fetch", (event) => {
 
 async function adopt({ page, asked, loaded }: Opened): Promise<boolean> {
   const keeper = await opened;
-  // a part that decodes textures has others, which its own worker has loaded unseen
+  // The part that decodes textures loads more files in its own worker, and the page does not list those.
   if (loaded.some(isOptional)) await keeper?.keepViewer(FILES.filter(isOptional));
-  await keeper?.adopt(page, asked).catch(() => undefined); // the network went; the next visit does
+  await keeper?.adopt(page, asked).catch(() => undefined); // the network failed; the next visit tries again
   await keeper?.save();
   return keeper?.hasPage === true;
 }

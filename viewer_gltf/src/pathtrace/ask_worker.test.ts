@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
 import { askWorker } from "./ask_worker";
 
-/** Answers each question by its number, the newest first. Counts the listeners that hear it. */
+/** Answers each question by its ID, the newest first, and lists the listeners. */
 class Echo extends EventTarget {
   heard: string[] = [];
   private waiting: { id: number }[] = [];

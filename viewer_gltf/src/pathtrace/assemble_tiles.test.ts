@@ -11,7 +11,7 @@ const volumeOf = ([x, y, z]: Size3) => x * y * z;
 
 describe("tiles that are assembled into one block", () => {
   it("reproduce the volume from which they were cut", () => {
-    // two tiles along x and two along y of one lattice, an apron of one each, two channels
+    // One lattice with two tiles along x and two along y. Each has an apron of one texel, and two channels.
     const whole: Size3 = [19, 15, 6];
     const random = seeded(1);
     const all = Uint8Array.from({ length: 2 * volumeOf(whole) }, () => Math.floor(256 * random()));

@@ -1,7 +1,7 @@
 /**
- * All tiles of a specimen as one block of texels, and the value range of its bricks. Pure arrays.
- * Tiles share one lattice; each brings an apron that agrees with its neighbours, and so what is
- * pasted over one another is the same.
+ * Assembles all tiles of a specimen into one block of texels, and finds the value range of its bricks. Pure arrays.
+ * All tiles share one lattice, and each has an apron with the texels of its neighbours. Where tiles overlap, they
+ * therefore have equal texels.
  */
 
 import { SKIP_BRICK } from "../bundle/generated/constants";
@@ -9,15 +9,15 @@ import type { Size3 } from "../bundle/ktx2";
 import { brickCounts } from "../voxels/skip_bricks";
 
 /**
- * One mip level of a tile, channels interleaved, x fastest. `at` and `whole`: where the tile's
- * finest level would lie in the block's finest, and how large it is.
+ * One mip level of a tile, channels interleaved, x fastest. `at` is the place of the tile's finest level in the block's
+ * finest level, and `whole` is its size there.
  */
 export type Part = Readonly<{ at: Size3; whole: Size3; size: Size3; texels: Uint8Array }>;
 
-/** The target of the tiles. */
+/** The block into which tiles are pasted. */
 export type Block = Readonly<{
   size: Size3;
-  /** Bytes a texel. */
+  /** Bytes per texel. */
   stride: number;
   texels: Uint8Array<ArrayBuffer>;
 }>;
@@ -27,8 +27,8 @@ export function emptyBlock(size: Size3, stride: number): Block {
 }
 
 /**
- * Write a tile into the block, which is a level of one that has `finest` texels. Coarser levels of
- * tiles and block don't fall on one another: there each texel takes the nearest.
+ * Writes a tile into the block, which is one level of a block with `finest` texels. At coarser levels the texels of
+ * tiles and block do not coincide, and each texel of the block takes the nearest one of the tile.
  */
 export function paste({ size, stride, texels }: Block, finest: Size3, part: Part): void {
   const [xs, ys, zs] = [0, 1, 2].map((k) => axisOf(size[k], finest[k], part, k));
@@ -44,7 +44,7 @@ export function paste({ size, stride, texels }: Block, finest: Size3, part: Part
   }
 }
 
-/** The block's texels along an axis that lie in a part, and the part's texel nearest to each. */
+/** Returns the block's texels along an axis that lie in a part, each with the nearest texel of the part. */
 function axisOf(count: number, finest: number, { at, whole, size }: Part, k: number) {
   const pairs: [number, number][] = [];
   for (let i = 0; i < count; i++) {
@@ -56,8 +56,8 @@ function axisOf(count: number, finest: number, { at, whole, size }: Part, k: num
 }
 
 /**
- * Smallest and largest value of every brick of SKIP_BRICK^3 texels of one channel, interleaved. A
- * brick that begins at texel i covers [i - 1, i + SKIP_BRICK]: all that a trilinear sample inside the brick can touch.
+ * Returns the smallest and largest value of every brick of SKIP_BRICK^3 texels of one channel, interleaved. A brick that
+ * begins at texel i covers [i - 1, i + SKIP_BRICK], which are all texels that a trilinear sample inside it can read.
  */
 export function brickRanges(
   { size, stride, texels }: Block,
@@ -79,7 +79,7 @@ export function brickRanges(
   return ranges;
 }
 
-/** The ranges of one row's bricks, interleaved, into `row`. */
+/** Writes the ranges of one row's bricks, interleaved, into `row`. */
 function rowRanges(texels: Uint8Array, from: number, stride: number, n: number, row: Uint8Array) {
   for (let b = 0; 2 * b < row.length; b++) {
     let low = 255;
@@ -103,7 +103,7 @@ function widen(ranges: Uint8Array, to: number, row: Uint8Array): void {
   }
 }
 
-/** The bricks along an axis that read a texel. */
+/** Returns the bricks along an axis whose range includes a texel. */
 function readers(texel: number, count: number): readonly number[] {
   const brick = Math.floor(texel / SKIP_BRICK);
   const inside = texel % SKIP_BRICK;
@@ -113,7 +113,7 @@ function readers(texel: number, count: number): readonly number[] {
   return found;
 }
 
-/** A worker's result of tiles: see `assemble_worker.ts`. */
+/** The tiles that a worker assembles: see `assemble_worker.ts`. */
 export type AssembleRequest = Readonly<{
   id: number;
   size: Size3;

@@ -35,7 +35,7 @@ describe("light from all around", () => {
       const angles = solidAngles(width, height);
       const weights = angles.map((angle, i) => luminance(given.rgb, i) * angle);
       const sum = weights.reduce((a, b) => a + b);
-      // each entry is drawn as often; it keeps its own texel or gives the other one
+      // Each entry is drawn with the same probability. It gives its own texel, or its alias.
       const drawn = new Float64Array(count);
       for (let i = 0; i < count; i++) {
         const [keep, other] = [aliases[2 * i], aliases[2 * i + 1]];
@@ -63,14 +63,14 @@ describe("light from all around", () => {
       rgb: Float32Array.from({ length: 24 }, (_, i) => (i < 12 ? [2, 1, 0.5][i % 3] : 0)),
     });
     half.mean.forEach((v, k) => {
-      expect(v).toBeCloseTo([1, 0.5, 0.25][k], 6); // bright above, dark below
+      expect(v).toBeCloseTo([1, 0.5, 0.25][k], 6); // mean of a bright upper half and a dark lower half
     });
     const dark = environmentTables({ width: 2, height: 2, rgb: new Float32Array(12) });
     expect([...dark.light].every((v) => v === 0)).toBe(true);
     const rgb = Float32Array.from([1, 1, 1, Number.NaN, -3, Number.POSITIVE_INFINITY]);
     const { light } = environmentTables({ width: 2, height: 1, rgb });
     expect([...light.slice(4)]).toEqual([0, 0, 0, 0]);
-    expect(light[3]).toBeCloseTo(1 / (2 * Math.PI), 5); // half of the sphere has it all
+    expect(light[3]).toBeCloseTo(1 / (2 * Math.PI), 5); // only half of the sphere is sampled
   });
 
   it("can be scaled to the brightness of another environment", () => {
@@ -82,7 +82,7 @@ describe("light from all around", () => {
     [1, 2, 4, 5].forEach((i) => {
       expect(light[i] / tables.light[i]).toBeCloseTo(factor, 6);
     });
-    expect(light[3]).toBe(tables.light[3]); // as likely as before
+    expect(light[3]).toBe(tables.light[3]); // the probability density is unchanged
     const dark = environmentTables({ width: 1, height: 1, rgb: new Float32Array(3) });
     expect(asBrightAs(dark, 1)).toBe(dark);
   });
@@ -110,7 +110,7 @@ describe("the user's environment map", () => {
   });
 
   it("is averaged down to few columns, also at edges that blocks do not fill", () => {
-    const [width, height] = [1027, 4]; // three by three texels in one, one column over
+    const [width, height] = [1027, 4]; // blocks of three by three texels, with one column left over
     const random = seeded(3);
     const data = Float32Array.from({ length: 3 * width * height }, () => random());
     const small = reduced(data, width, height, 3, false);

@@ -1,9 +1,9 @@
 /**
- * Light from all around, as the path tracer draws directions from it: radiance and the density of
- * each direction, and a table of aliases (Walker 1977; built as by Vose 1991). Pure arrays.
+ * Makes the tables by which the path tracer samples directions of an environment's light. They contain radiance and
+ * probability density of each direction, and aliases (Walker 1977; built by the method of Vose 1991). Pure arrays.
  */
 
-/** Row 0 is the top, rows of `width` texels RGB, linear radiance. */
+/** An environment map: rows of `width` RGB texels of linear radiance, top row first. */
 export type Radiance = Readonly<{ width: number; height: number; rgb: Float32Array }>;
 
 export type EnvironmentTables = Readonly<{
@@ -13,7 +13,7 @@ export type EnvironmentTables = Readonly<{
   light: Float32Array<ArrayBuffer>;
   /** Probability to keep a texel, and the texel that is taken instead. */
   aliases: Float32Array<ArrayBuffer>;
-  /** Radiance from all around, in the mean. */
+  /** Mean radiance over all directions. */
   mean: readonly [number, number, number];
 }>;
 
@@ -46,13 +46,13 @@ export function environmentTables({ width, height, rgb }: Radiance): Environment
   return { width, height, light, aliases: aliasesOf(weights, sum), mean };
 }
 
-/** The same light, scaled to a mean luminance of `luminance`; darkness stays. */
+/** Returns the same light, scaled to the mean luminance `luminance`; a dark environment stays dark. */
 export function asBrightAs(tables: EnvironmentTables, luminance: number): EnvironmentTables {
   const [r, g, b] = tables.mean;
   const found = 0.2126 * r + 0.7152 * g + 0.0722 * b;
   if (found <= 0) return tables;
   const factor = luminance / found;
-  const light = tables.light.map((v, i) => (i % 4 === 3 ? v : factor * v)); // densities stay
+  const light = tables.light.map((v, i) => (i % 4 === 3 ? v : factor * v)); // the probability densities do not change
   return { ...tables, light, mean: [factor * r, factor * g, factor * b] };
 }
 

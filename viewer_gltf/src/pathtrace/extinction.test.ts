@@ -25,7 +25,7 @@ describe("a medium's table", () => {
     for (const i of [0, 1, 100, 200, 254]) {
       expect(1 - Math.exp(-extinctionOf(made, i) * voxel_um)).toBeCloseTo(i / 255, 5);
     }
-    expect(Number.isFinite(extinctionOf(made, 255))).toBe(true); // an opacity of 1, too
+    expect(Number.isFinite(extinctionOf(made, 255))).toBe(true); // also for an opacity of 1
   });
 
   it("is never denser than its majorants, at any gradient", () => {
@@ -82,7 +82,7 @@ describe("majorants", () => {
     Math.floor(256 * random() ** 3),
   );
   const block = { size, stride, texels };
-  // neither rises all along
+  // Neither table rises everywhere.
   const appearances = [
     { color: WHITE, table: tableOf((i) => 100 + 90 * Math.sin(i / 9)) },
     { color: WHITE, table: tableOf((i) => (i % 50 === 7 ? 200 : 3)) },
@@ -90,7 +90,7 @@ describe("majorants", () => {
   const table = mediumTable(appearances, 1, 2);
   const fine = majorants(table, [brickRanges(block, 0), brickRanges(block, 1)]);
 
-  /** As the GPU samples: linear between texels, then between the table's entries. */
+  /** Returns the extinction like the GPU: linear between texels, then linear between the table's entries. */
   function extinctionAt(p: readonly number[]): number {
     let sum = 0;
     for (let c = 0; c < stride; c++) {
@@ -114,7 +114,7 @@ describe("majorants", () => {
     return sum;
   }
 
-  it.each([1, 2, 4])("are exceeded by no sample, for %i^3 bricks in one", (factor) => {
+  it.each([1, 2, 4])("are not exceeded by any sample, for blocks of %i^3 bricks", (factor) => {
     const { majorants: found, counts } = coarserMajorants(fine, brickCounts(size), factor);
     expect(counts).toEqual(brickCounts(size).map((n) => Math.ceil(n / factor)));
     let largest = 0;
@@ -126,7 +126,7 @@ describe("majorants", () => {
       expect(extinction).toBeLessThanOrEqual(majorant * (1 + 1e-5));
       largest = Math.max(largest, extinction / majorant);
     }
-    expect(largest).toBeGreaterThan(0.5); // nor are they far too large
+    expect(largest).toBeGreaterThan(0.5); // the majorants are not far too large
   });
 
   it("are zero in empty space", () => {

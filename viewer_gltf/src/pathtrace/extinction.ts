@@ -1,16 +1,16 @@
 /**
- * The medium that paths go through: extinction and albedo of every intensity, and the largest
- * extinction in every brick. Pure arrays.
+ * Computes the medium through which paths go: extinction and albedo for every intensity, and the largest extinction in
+ * every brick. Pure arrays.
  */
 import type { Size3 } from "../bundle/ktx2";
 import { ROWS } from "../bundle/transfer_2d";
 import { ENTRIES } from "../voxels/transfer_luts";
 import { envelopeOf, type TransferTable2d } from "../voxels/transfer_table_2d";
 
-/** Largest opacity, 0..1: 1 would be infinitely dense. */
+/** Largest opacity, 0..1; an opacity of 1 would mean an infinite extinction. */
 const MAX_OPACITY = 0.999;
 
-/** How one channel looks: see `tile_march`. */
+/** The appearance of one channel: see `tile_march`. */
 export type MediumAppearance = Readonly<{
   color: readonly [number, number, number];
   table: Uint8Array;
@@ -18,10 +18,10 @@ export type MediumAppearance = Readonly<{
 }>;
 
 /**
- * Albedo (rgb) and extinction per um (a) of 256 intensities, 4 floats each, a row for each channel.
- * If any channel has a two-dimensional transfer function, each has a row for each gradient.
+ * Returns albedo (rgb) and extinction per um (a) of 256 intensities, 4 floats each, in a row for each channel.
+ * If any channel has a two-dimensional transfer function, every channel has a row for each gradient.
  *
- * @param voxel_um the path that an opacity of the tables holds for
+ * @param voxel_um length of the path to which an opacity in the tables refers
  * @param density factor to the extinction
  */
 export function mediumTable(
@@ -46,7 +46,7 @@ export function mediumTable(
   return rows;
 }
 
-/** Rows of each channel in `mediumTable`. */
+/** Returns the number of rows of each channel in `mediumTable`. */
 export function rowsOf(appearances: readonly MediumAppearance[]): number {
   return appearances.some(({ table2d }) => table2d != null) ? ROWS : 1;
 }
@@ -66,9 +66,9 @@ function fillRow(
 }
 
 /**
- * The largest extinction in every brick, whatever the gradients: no sample inside it exceeds that.
+ * Returns the largest extinction in every brick for any gradient; no sample inside the brick exceeds it.
  *
- * @param table of `mediumTable`
+ * @param table from `mediumTable`
  * @param bricks of each channel, smallest and largest intensity of every brick, interleaved
  */
 export function majorants(
@@ -88,7 +88,7 @@ export function majorants(
   return found;
 }
 
-/** The largest of each `factor`^3 bricks, and how many there are along each axis then. */
+/** Returns the largest value of each block of `factor`^3 bricks, and the number of blocks along each axis. */
 export function coarserMajorants(
   fine: Float32Array<ArrayBuffer>,
   counts: Size3,
@@ -110,7 +110,7 @@ export function coarserMajorants(
   return { majorants: found, counts: [mx, my, mz] };
 }
 
-/** Largest extinction between intensities lo and hi, for every lo <= hi: index lo * 256 + hi. */
+/** Returns the largest extinction between intensities lo and hi, for every lo <= hi, at index lo * 256 + hi. */
 function largestBetween(row: Float32Array): Float32Array {
   const found = new Float32Array(ENTRIES * ENTRIES);
   for (let lo = 0; lo < ENTRIES; lo++) {

@@ -5,7 +5,7 @@ import { areNear, areSame, turnOf, viewOf } from "./eye_rays";
 const AWAY = 100;
 const MIDDLE = new Vector3(0, 0, 0);
 
-/** An eye before the middle, moved (um) and turned (degrees: up, left, rolled). */
+/** An eye in front of the centre, moved by um and turned by degrees (up, left, rolled). */
 function eye(aside: readonly number[] = [0, 0, 0], turned_deg: readonly number[] = [0, 0, 0]) {
   const camera = new PerspectiveCamera(50, 1.5, 1, 1000);
   camera.position.set(aside[0], aside[1], AWAY + aside[2]);
@@ -48,7 +48,7 @@ describe("a view", () => {
     ["a roll", [0, 0, 0], [0, 0, 0.25], true],
     ["a large roll", [0, 0, 0], [0, 0, 0.4], false],
   ] as const)("is near the one before after %s, or not", (name, aside, turned, expected) => {
-    // for any size and place of the box
+    // The result does not depend on size and place of the box.
     for (const box of [IDENTITY, new Matrix4().makeScale(0.01, 0.01, 0.01).setPosition(1, 2, 3)]) {
       const [before, now] = views(eye(), eye(aside, turned), box);
       const middle = MIDDLE.clone().applyMatrix4(box.clone().invert());

@@ -10,15 +10,15 @@ import { TRACE_PROBE } from "./shaders/sources";
 
 /** Number of pixels of the small frame, both eyes together. */
 const PIXELS = 600;
-/** Samples of each after a change, and in a frame that only moves. */
+/** Number of samples of each pixel after a change. */
 const FIRST_SAMPLES = 8;
-/** Share of the earlier sums that a sample leaves: about as many samples count as after a change. */
+/** Factor to the earlier sums at each further sample, so that about FIRST_SAMPLES samples count. */
 const KEPT = 1 - 1 / FIRST_SAMPLES;
 
-/** Sums of light and coverage, a texel each. */
+/** Sums of light and coverage, one texel for each kind of frame. */
 export type ProbedLight = Readonly<{ traced: Texture; marched: Texture }>;
 
-/** Draws one sample of every pixel, at `scale` pixels to one of the frame buffer. */
+/** Draws one sample of every pixel; `scale` is the resolution relative to the frame buffer. */
 export type DrawSample = (target: WebGLRenderTarget, scale: number) => void;
 
 export class LightProbe {
@@ -35,7 +35,7 @@ export class LightProbe {
     uOcclusion: { value: 0 },
   });
 
-  /** Drops what was measured, because the light has changed. */
+  /** Drops the measurement, because the light has changed. */
   forget(): void {
     this.measured = 0;
   }
@@ -46,8 +46,8 @@ export class LightProbe {
   }
 
   /**
-   * @param marched of the same view, linear and premultiplied
-   * @param occlusion by how much the picture darkens what is enclosed
+   * @param marched the ray-marched frame of the same view, linear and premultiplied
+   * @param occlusion how strongly enclosed places are darkened
    */
   measure(
     renderer: WebGLRenderer,

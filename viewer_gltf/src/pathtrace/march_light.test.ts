@@ -21,7 +21,7 @@ describe("the light of the ray-marched frame that stands in for path tracing", (
   });
 
   it("divides a row across the horizon between both halves by solid angle", () => {
-    // the middle one of three rows reaches from 60 to 120 degrees: half of each half of the sphere
+    // The middle one of three rows reaches from 60 to 120 degrees, which is half of each half of the sphere.
     const { sky, ground } = roomOf(3, 8, 2, 0);
     expect(sky[0]).toBeCloseTo(5, 5);
     expect(ground[0]).toBeCloseTo(1, 5);

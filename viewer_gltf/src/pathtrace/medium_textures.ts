@@ -1,4 +1,4 @@
-/** The textures that paths look up: the medium by intensity, its majorants by brick, and the room's light. */
+/** The textures that paths read: the medium by intensity, its majorants by brick, and the environment's light. */
 import { type Data3DTexture, type DataTexture, RGBAFormat, RGFormat } from "three";
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import { float3D, floatTexture } from "../gpu/float_targets";
@@ -23,14 +23,14 @@ export class MediumTextures {
   private environment: DataTexture = floatTexture(1, 1, RGBAFormat);
   private aliases: DataTexture = floatTexture(1, 1, RGFormat);
 
-  /** @param brick texels along an edge of a brick of majorants: SKIP_BRICK or a multiple */
+  /** @param brick edge of a brick of majorants in texels: SKIP_BRICK or a multiple of it */
   constructor(
     private readonly pass: ScreenPass<TraceUniforms>,
     private readonly brick: number,
   ) {}
 
   /**
-   * @param appearances of the channels, in the order of the texture's
+   * @param appearances of the channels, in the order of the texture's channels
    * @param density factor to the extinction
    */
   setAppearances(

@@ -259,7 +259,7 @@ export class Tracer {
     this.drawing = drawing;
   }
 
-  /** Find how much light there is, by a few paths, for the stand-in. */
+  /** Measures the brightness of the light with a few paths, for the ray-marched frame that stands in. */
   private probeLight(
     renderer: WebGLRenderer,
     eyes: Eyes,
@@ -292,7 +292,7 @@ export class Tracer {
     return historyOf(views, { anchors, seen: rested >= 1 ? seen : [], middle, mayTremble });
   }
 
-  /** From um of the box to the room. */
+  /** Returns the matrix from um of the box to the scene. */
   private boxMatrix(specimen: Matrix4): Matrix4 {
     if (this.texels === null) throw new Error("there is nothing to trace");
     return specimen.clone().multiply(boxToWorld(this.texels.frame));

@@ -6,12 +6,12 @@ type Vec3 = [number, number, number];
 
 /** The block that several tiles form together. All of them share a lattice and a matrix. */
 export type BlockFrame = Readonly<{
-  /** um, before `matrix`. */
+  /** Corners of the box, um, before `matrix` is applied. */
   min: Vec3;
   max: Vec3;
   spacing_um: Vec3;
   matrix: readonly number[];
-  /** Texels, with the apron. */
+  /** Size in texels, including the apron. */
   size: Size3;
   apron: number;
   /** Position of each tile's first texel in the block, by tile ID. */
@@ -44,7 +44,7 @@ export function frameOf(volumes: readonly TileVolume[]): BlockFrame {
   const places = new Map(
     alike.map(({ tile, bounds_um: b }) => [
       tile,
-      // texture rows run against y
+      // Texture rows run in the direction of -y.
       [cells(0, min[0], b.min[0]), cells(1, b.max[1], max[1]), cells(2, min[2], b.min[2])] as Vec3,
     ]),
   );

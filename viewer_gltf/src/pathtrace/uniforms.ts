@@ -13,13 +13,13 @@ import { turnOf } from "./eye_rays";
 import type { MediumTexels } from "./medium_loader";
 import type { BlockFrame } from "./texel_frame";
 
-/** Most light of a path: halves of floats end at 65504 ... */
+/** Largest light of a path; half-precision floats end at 65504. */
 const MAX_LIGHT = 60_000;
-/** ... and a picture of few samples would sparkle. */
+/** Largest light of a path while the view moves; frames with few samples would otherwise have bright dots. */
 const MAX_LIGHT_MOVING = 200;
-/** Most scatterings of a path, in a medium that swallows nothing. */
+/** Largest number of scatterings of a path; a medium that absorbs nothing would not end it. */
 const MAX_SCATTERS = 512;
-/** ... in a picture that moves: the room's mean replaces the rest of the path. */
+/** Largest number of scatterings while the view moves; the environment's mean replaces the rest of the path. */
 const FEW_SCATTERS = 16;
 /** Exponent of a shiny surface's lobe. */
 const GLOSS = 60;
@@ -28,7 +28,7 @@ const GLOSS = 60;
 const LAMP_RADIUS = 0.08;
 const OCCLUSION_REACH = 0.06;
 
-/** Settings that the gathered samples depend on: a change of one of them drops the samples. */
+/** Returns a key of the settings on which the gathered samples depend; they are dropped when it changes. */
 export function keyOf(
   { width_px, height_px }: Eyes,
   scene: TraceScene,
@@ -38,7 +38,7 @@ export function keyOf(
   return `${width_px} ${height_px} ${scale} ${isDraft} ${matterOf(scene)}`;
 }
 
-/** The parts of the scene besides the medium: opaque things and cuts. */
+/** Returns a key of the scene apart from the medium: opaque objects and cuts. */
 export function matterOf({ solids, clip }: TraceScene): string {
   return `${solids} ${JSON.stringify(clip)}`;
 }
@@ -102,12 +102,12 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
   };
 }
 
-/** From the box's own coordinates, um from its low corner, to the bundle's world, um. */
+/** Returns the matrix from the box's own coordinates, um from its low corner, to the bundle's world, um. */
 export function boxToWorld({ matrix, min }: BlockFrame): Matrix4 {
   return new Matrix4().fromArray([...matrix]).multiply(new Matrix4().makeTranslation(...min));
 }
 
-/** The block of texels, its box and where that lies in them. */
+/** Sets the block of texels, its box, and the place of the box in the texels. */
 export function texelsInto(uniforms: TraceUniforms, { frame, texture, index, size }: MediumTexels) {
   uniforms.uVolume.value = uniforms.uOldVolume.value = texture;
   uniforms.uIndex.value = index;
@@ -117,7 +117,7 @@ export function texelsInto(uniforms: TraceUniforms, { frame, texture, index, siz
   uniforms.uVoxel.value = Math.min(...frame.spacing_um);
   const first = frame.size.map((n) => (frame.apron + 0.5) / n);
   const last = frame.size.map((n) => (n - frame.apron - 0.5) / n);
-  uniforms.uTexLow.value.set(first[0], last[1], first[2]); // rows run against y
+  uniforms.uTexLow.value.set(first[0], last[1], first[2]); // rows run in the direction of -y
   uniforms.uTexPerUm.value.set(
     (last[0] - first[0]) / Math.max(edges[0], 1e-9),
     (first[1] - last[1]) / Math.max(edges[1], 1e-9),
@@ -127,7 +127,7 @@ export function texelsInto(uniforms: TraceUniforms, { frame, texture, index, siz
 }
 
 /**
- * @param box from um of the box to the room
+ * @param box from um of the box to the scene
  * @param roomLight mean radiance of the environment
  */
 export function sceneInto(
@@ -173,7 +173,7 @@ function lampsInto(
     const aside = new Vector3(x, y, z).multiplyScalar(edge);
     const at = aside.clone().add(middle).applyMatrix4(toBox);
     uniforms.uLamps.value[count].set(at.x, at.y, at.z, LAMP_RADIUS * edge);
-    // irradiance pi in the middle is what a white room gives
+    // A lamp of strength 1 gives the irradiance pi at the centre, like a white room.
     const intensity = strength * Math.PI * Math.max(aside.lengthSq(), (edge / 4) ** 2);
     uniforms.uLampLight.value[count].set(...color).multiplyScalar(intensity);
     count++;

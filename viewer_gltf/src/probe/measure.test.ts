@@ -38,13 +38,13 @@ function fill(size: Size3, at: (i: number, j: number, k: number) => number): Vol
 }
 
 describe("the value at a point", () => {
-  // A ramp along each axis is what trilinear interpolation gives back exactly.
+  // Trilinear interpolation reproduces a ramp along each axis exactly.
   const ramp = fill([10, 6, 5], (i, j, k) => 10 * i + 7 * j + 20 * k);
-  // Texel 1 lies on the low corner; rows run against world y.
+  // Texel 1 lies on the low corner, and rows run in the direction of -y of the world.
   const expected = (x: number, y: number, z: number) =>
     10 * (1 + (x - 10) / 0.5) + 7 * (1 + (-10 - y) / 0.5) + 20 * (1 + (z - 2));
 
-  it("is a linear ramp's own between the texels, to the rim", () => {
+  it("follows a linear ramp between the texels, up to the edge of the tile", () => {
     for (const x of [10, 10.2, 12.99, 13.5])
       for (const y of [-11.5, -10.9, -10])
         for (const z of [2, 2.6, 4]) {
@@ -58,21 +58,21 @@ describe("the value at a point", () => {
     expect(value).toBeCloseTo(1000 + 2 * 37);
   });
 
-  it("is that of a voxel, by its centre, nearest to the point", () => {
+  it("belongs to the voxel whose centre is nearest to the point", () => {
     expect(voxelAt(tile(), [10.24, -10.26, 2.4])).toEqual([10, -10.5, 2]);
     expect(voxelAt(tile(), [13.5, -11.5, 4])).toEqual([13.5, -11.5, 4]);
     expect(voxelAt(tile(), [13.6, -11.5, 4])).toBeNull();
-    // a quarter turn about z, then 100 um along x: the voxel is told in the tile's own place
+    // The tile is turned by a quarter about z, then moved 100 um along x. The voxel is given in the tile's own frame.
     const moved = tile([0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 100, 0, 0, 1]);
     expect(voxelAt(moved, [100 + 10.9, 12.3, 3])).toEqual([12.5, -11, 3]);
   });
 
-  it("is written as it was measured", () => {
+  it("is written with all digits if it was measured", () => {
     expect(measuredText(-1023, "HU")).toBe("-1023 HU");
     expect(measuredText(0.1)).toBe("0.1");
   });
 
-  it("is none outside the tile", () => {
+  it("is null outside the tile", () => {
     for (const p of [
       [9.9, -11, 3],
       [12, -9.9, 3],
@@ -83,7 +83,7 @@ describe("the value at a point", () => {
   });
 
   it("follows a tile that was moved and turned in the stage", () => {
-    // A quarter turn about z, x to y and y to -x, then 100 um along x.
+    // The tile is turned by a quarter about z (x to y, y to -x), then moved 100 um along x.
     const moved = tile([0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 100, 0, 0, 1]);
     const value = valueAt(moved, ramp, [0, 255], [100 + 10.9, 12.3, 3]);
     expect(value).toBeCloseTo(expected(12.3, -10.9, 3), 9);
@@ -92,13 +92,13 @@ describe("the value at a point", () => {
 
   it("comes from a coarser level at the same place", () => {
     const half = fill([5, 3, 2], (i) => 50 * i);
-    // Level 0's coordinate of a point doubles at half the size: u = (i + 0.5) / n.
+    // Both levels cover the same box, so that u = (i + 0.5) / n is the same in both.
     const texel = 1 + (12 - 10) / 0.5;
     const expectedHalf = 50 * (((texel + 0.5) / 10) * 5 - 0.5);
     expect(valueAt(tile(), half, [0, 255], [12, -11, 3])).toBeCloseTo(expectedHalf, 9);
   });
 
-  it("is that of one of several channels side by side", () => {
+  it("is read from one of several interleaved channels", () => {
     const texels = new Uint8Array(4 * ramp.texels.length);
     ramp.texels.forEach((value, i) => {
       texels.set([255, 0, value, 9], 4 * i);
@@ -108,7 +108,7 @@ describe("the value at a point", () => {
     expect(value).toBeCloseTo(expected(12.1, -10.6, 3.3), 9);
   });
 
-  it("is found in a volume of one texel", () => {
+  it("is defined in a volume of one texel", () => {
     const flat: TileVolume = {
       ...tile(),
       size: [1, 1, 1],
@@ -134,7 +134,7 @@ describe("the distance of two points", () => {
     expect(distanceBetween([1, 2, 3], [3, 5, 9])).toBe(7);
   });
 
-  it("and what an angle and a line come to", () => {
+  it("is written as a text, like an angle and the length of a line", () => {
     const line = [
       [0, 0, 0],
       [3, 4, 0],

@@ -1,4 +1,4 @@
-/** A measurement's text: the distance of two points, the channel's value at one. Pure. */
+/** Computes measurements and writes their texts: the distance of two points, a channel's value at a point. Pure. */
 import { Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
@@ -13,17 +13,17 @@ import { textureCorners } from "../voxels/texture_space";
 export type VolumeLevel = Readonly<{
   size: Size3;
   texels: Uint8Array;
-  /** Bytes a texel, where channels lie side by side, and which of them is meant; else 1 and 0. */
+  /** Bytes of a texel and index of the channel in it if channels are interleaved; otherwise 1 and 0. */
   stride?: number;
   channel?: number;
 }>;
-/** The voxel values of the source that are 0 and 255 in the volumes. */
+/** The values of the source that are 0 and 255 in the volumes. */
 export type Window = readonly [number, number];
 
-/** Tolerance at the rim: the matrices round, and points of the rim still are inside. */
+/** Tolerance at the edge of a tile, as a share of the box. Points on the edge count as inside despite rounding. */
 const RIM = 1e-6;
 
-/** What a measurement comes to: a length, an angle, a length and how many points. */
+/** Returns a measurement's text: a distance, an angle, or a line's length and number of points. */
 export function measurementText(kind: MeasureKind, points: readonly Vec3[]): string {
   if (kind === "angle") {
     const angle = angleOf(points);
@@ -34,10 +34,10 @@ export function measurementText(kind: MeasureKind, points: readonly Vec3[]): str
 }
 
 /**
- * The channel's value at a point (um, world), on the source's scale: trilinear between texels, as
- * the march samples it. null outside the tile.
+ * Returns the channel's value at a point (um, world) on the source's scale; null outside the tile. The value is
+ * trilinear between texels, as in the ray march.
  *
- * @param level any mip level of the tile's texture: all cover the same box
+ * @param level any mip level of the tile's texture, since all of them cover the same box
  */
 export function valueAt(
   volume: TileVolume,
@@ -56,7 +56,7 @@ export function valueAt(
   return start + ((end - start) * trilinear(level, at[0], at[1], at[2])) / 255;
 }
 
-/** The centre of the voxel in which a point (um, world) lies, in the volume's own um; null outside. */
+/** Returns the centre of the voxel that contains a point (um, world), in the volume's own um; null outside. */
 export function voxelAt(volume: TileVolume, point_um: Vec3): Vec3 | null {
   const { min, max } = volume.bounds_um;
   const centre = sharesIn(volume, point_um)?.map((share, axis) => {
@@ -67,7 +67,7 @@ export function voxelAt(volume: TileVolume, point_um: Vec3): Vec3 | null {
   return centre === undefined ? null : [centre[0], centre[1], centre[2]];
 }
 
-/** Where a point (um, world) lies along the edges of a volume's box, 0 to 1; null outside. */
+/** Returns the place of a point (um, world) along the edges of a volume's box, 0 to 1; null outside. */
 function sharesIn({ bounds_um, matrix }: TileVolume, point_um: Vec3): number[] | null {
   const { min, max } = bounds_um;
   const toTile = new Matrix4().fromArray(matrix).invert();
@@ -79,24 +79,24 @@ function sharesIn({ bounds_um, matrix }: TileVolume, point_um: Vec3): number[] |
   return shares.every((share) => share >= -RIM && share <= 1 + RIM) ? shares : null;
 }
 
-/** A value as it was measured, and its unit. */
+/** Writes a measured value with all digits, and its unit. */
 export function measuredText(value: number, unit = ""): string {
   return `${value} ${unit}`.trim();
 }
 
-/** The unit of the source's values; "": it states none. DICOM's CT values are Hounsfield units. */
+/** Returns the unit of the source's values: Hounsfield units for CT, otherwise "". */
 export function unitOf({ specimen }: Pick<Manifest, "specimen">): string {
   return specimen.modality === "CT" ? "HU" : "";
 }
 
-/** As many digits as 8 bits of the window hold, and the unit. */
+/** Writes a value with the digits that 8 bits of the window resolve, and its unit. */
 export function valueText(value: number, [start, end]: Window, unit = ""): string {
   const step = Math.abs(end - start) / 255;
   const decimals = step > 0 ? Math.max(0, -Math.floor(Math.log10(step))) : 0;
   return `${value.toFixed(Math.min(decimals, 100))} ${unit}`.trim();
 }
 
-/** At a place in texels, 0 the centre of the first; clamped to the edge, as the GPU does. */
+/** Returns the value at a place in texels, where 0 is the centre of the first; clamped to the edge as on the GPU. */
 function trilinear(level: VolumeLevel, x: number, y: number, z: number): number {
   const { texels, stride = 1, channel = 0 } = level;
   const [nx, ny, nz] = level.size;

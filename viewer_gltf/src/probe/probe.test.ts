@@ -21,13 +21,13 @@ const TILES = [
   { id: "r0_c1", bounds_um: { min: [100, -100, 0], max: [200, 0, 100] } as Box },
 ];
 const FRONT: Ray = { origin: [50, -50, 1000], direction: [0, 0, -1] };
-/** The specimen stands turned, small and aside in the room. */
+/** From um to the scene: the specimen is turned, small and off-centre. */
 const ROOM = new Matrix4()
   .makeTranslation(0.3, 1.4, -1)
   .multiply(new Matrix4().makeRotationY(0.7))
   .multiply(new Matrix4().makeScale(0.004, 0.004, 0.004));
 
-/** A solid box, um, in the room. */
+/** A solid box, given in um and placed in the scene. */
 function solid(min: Vector3, max: Vector3, channel: string): ShownSurface {
   const size = max.clone().sub(min);
   const middle = min.clone().add(max).multiplyScalar(0.5);
@@ -49,7 +49,7 @@ describe("a ray at surfaces", () => {
   const far = solid(new Vector3(20, -80, 10), new Vector3(80, -20, 40), "far");
   const probe = (clip: Clip, ray = FRONT) => probeSurfaces(ray, [far, near], ROOM, clip, TILES);
 
-  it("meets the first one, in um", () => {
+  it("meets the nearest one, in um", () => {
     const found = probe(NO_CLIP);
     expect(found?.channel).toBe("near");
     expect(found?.tile).toBe("r0_c0");
@@ -57,7 +57,7 @@ describe("a ray at surfaces", () => {
     expect(found?.distance_um).toBeCloseTo(910, 2);
   });
 
-  it("goes through what is cut away, to the cut of a solid that it opens", () => {
+  it("passes parts that are cut away, and meets the cut face of a solid", () => {
     const through = probe({ box: { min: [0, -100, 0], max: [100, 0, 50] }, plane: null });
     expect(through?.channel).toBe("far");
     expectNear(through?.point, [50, -50, 40]);
@@ -66,7 +66,7 @@ describe("a ray at surfaces", () => {
     expectNear(opened?.point, [50, -50, 75]);
   });
 
-  it("meets nothing where nothing is kept, or beside", () => {
+  it("meets nothing beside the surfaces, or where all of them are cut away", () => {
     expect(probe({ box: { min: [0, -100, 0], max: [9, 0, 100] }, plane: null })).toBeNull();
     expect(probe(NO_CLIP, { ...FRONT, origin: [5, -50, 1000] })).toBeNull();
   });
@@ -74,7 +74,7 @@ describe("a ray at surfaces", () => {
 
 describe("a ray at volumes", () => {
   const SIDE = 50;
-  /** Texels by their place in the box, um, without an apron: texel centres span the box. */
+  /** A volume whose texels are a function of their place in the box, um; without an apron, so texel centres span it. */
   function volumeOf(
     channel: string,
     value: (z_um: number) => number,
@@ -101,23 +101,23 @@ describe("a ray at volumes", () => {
     return { tile: "r0_c0", channel, volume, level: { size, texels }, table, isInDisc: false };
   }
 
-  it("ends at the wall that hides the rest", () => {
+  it("ends at an opaque layer that hides the rest", () => {
     const wall = volumeOf("A", (z) => (z < 70 ? 255 : 0), 255);
     const found = probeVolumes(FRONT, [wall], NO_CLIP, null);
     expect(found?.channel).toBe("A");
-    expect(Math.abs((found?.point[2] ?? 0) - 70)).toBeLessThan(2.1); // a voxel
+    expect(Math.abs((found?.point[2] ?? 0) - 70)).toBeLessThan(2.1); // about a voxel
   });
 
-  it("ends in a haze where half of what is seen lies before", () => {
+  it("ends in a haze where half of the visible opacity lies in front", () => {
     const haze = volumeOf("A", () => 255, 2);
     const found = probeVolumes(FRONT, [haze], NO_CLIP, null);
-    // transmission 1 - 2 / 255 a voxel of 100 / 49 um, through all of it T = q ** 49
+    // A voxel of 100 / 49 um transmits q = 1 - 2 / 255 of the light, and all 49 voxels transmit q ** 49.
     const q = 1 - 2 / 255;
     const depth = (Math.log((1 + q ** 49) / 2) / Math.log(q)) * (100 / 49);
     expect(Math.abs(100 - depth - (found?.point[2] ?? 0))).toBeLessThan(2.1);
   });
 
-  it("returns the channel that is met, and heeds cut and disc", () => {
+  it("returns the channel that it meets, and respects the cut and the disc", () => {
     const front = volumeOf("A", (z) => (z > 60 ? 255 : 0), 255);
     const back = volumeOf("B", (z) => (z < 30 ? 255 : 0), 255);
     const both = [back, front];
@@ -133,7 +133,7 @@ describe("a ray at volumes", () => {
     expect(probeVolumes(FRONT, inDisc, NO_CLIP, aside)?.channel).toBe("B");
   });
 
-  it("meets nothing where nothing is seen", () => {
+  it("meets nothing where nothing is visible", () => {
     expect(probeVolumes(FRONT, [volumeOf("A", () => 100, 255)], NO_CLIP, null)).toBeNull();
     expect(probeVolumes(FRONT, [], NO_CLIP, null)).toBeNull();
     const aside: Ray = { origin: [500, -50, 1000], direction: [0, 0, -1] };
@@ -160,7 +160,7 @@ describe("a point near a volume", () => {
     return found && new Vector3(...found).applyMatrix4(matrix.clone().invert()).toArray();
   };
 
-  it("is the nearest one inside, if it is at most two voxels outside", () => {
+  it("is moved to the nearest place inside if it is at most two voxels outside", () => {
     expectNear(nearest([3, -4, 5]) ?? [], [3, -4, 5]);
     expectNear(nearest([11.9, -23.9, 47.9]) ?? [], [10, -20, 40]);
     expect(nearest([12.1, -4, 5])).toBeNull();
@@ -170,7 +170,7 @@ describe("a point near a volume", () => {
 });
 
 describe("a ray at the tiles' boxes", () => {
-  it("enters the first, as far as it is kept", () => {
+  it("enters the first one at the part that is not cut away", () => {
     expect(probeBoxes(FRONT, TILES, NO_CLIP)).toMatchObject({
       tile: "r0_c0",
       point: [50, -50, 100],

@@ -1,9 +1,9 @@
 /**
- * What a ray into the specimen means: the first surface, or what is seen of a volume, or where it
- * enters a tile. All in um, world; nothing counts that is cut away.
+ * Finds the place at which a ray meets the specimen: the first surface, the visible place of a volume, or the entry into
+ * a tile. All places are in um, world; parts that are cut away are ignored.
  *
- * In a volume the place is where half of what is seen along the ray lies in front: the eye sees it
- * there, whether the volume is a wall or a haze.
+ * In a volume the place is where half of the opacity along the ray lies in front. The eye locates an opaque layer and a
+ * haze there.
  */
 
 import { Box3, type Intersection, Matrix4, type Mesh, Raycaster, Vector3 } from "three";
@@ -16,14 +16,14 @@ import type { Ray, Vec3 } from "../math/vec3";
 import type { ShownSurface, ShownVolume } from "../state/on_screen";
 import { type VolumeLevel, valueAt } from "./measure";
 
-/** A channel of a marched tile, with texels at hand. */
+/** A channel of a tile whose volume is shown, with its texels. */
 export type ProbedVolume = Omit<ShownVolume, "source"> &
   Readonly<{ volume: TileVolume; level: VolumeLevel }>;
 
-/** The disc's cone: it shows volumes where the angle's cosine is larger. */
+/** The disc's cone. It contains points whose angle to the axis has a larger cosine. */
 export type Cone = Readonly<{ apex_um: Vector3; axis_um: Vector3; cosine: number }>;
 
-/** `channel`: null where only a tile's box was met. */
+/** A hit of a ray; `channel` is null if only a tile's box was hit. */
 export type Probed = Readonly<{
   point: Vec3;
   tile: string;
@@ -32,13 +32,13 @@ export type Probed = Readonly<{
 }>;
 
 const MAX_SAMPLES = 512;
-/** Least opacity along a whole ray that the user sees, 0..1. */
+/** Smallest opacity along a whole ray that a user can see, 0..1. */
 const SEEN = 0.1;
 const BYTES = [0, 255] as const;
-/** Farthest place of a surface outside its volume, in voxels. */
+/** Largest distance of a surface outside its volume, in voxels. */
 const OUTSIDE_VOXELS = 2;
 
-/** The nearest tile: a point of a surface can lie a little outside all of them. */
+/** Returns the nearest tile, since a point of a surface can lie slightly outside all tiles. */
 export function tileAt({ tiles }: Pick<Manifest, "tiles">, point: Vec3): string {
   const place = new Vector3(...point);
   const distances = tiles.map(({ bounds_um: { min, max } }) =>
@@ -47,7 +47,7 @@ export function tileAt({ tiles }: Pick<Manifest, "tiles">, point: Vec3): string 
   return tiles[distances.indexOf(Math.min(...distances))].id;
 }
 
-/** The same ray, its direction of unit length. */
+/** Returns the same ray with a direction of unit length. */
 export function unitRay({ origin, direction }: Ray): Ray {
   return { origin, direction: new Vector3(...direction).normalize().toArray() };
 }
@@ -57,11 +57,11 @@ function pointOn({ origin: o, direction: d }: Ray, t: number): Vec3 {
 }
 
 /**
- * The nearest point of a surface that is kept. Where the ray comes to the inside of a solid that
- * is cut open, it is the point of the cut.
+ * Returns the nearest point of a surface that is not cut away. If the ray first meets the inside of a solid that is cut
+ * open, it returns the point on the cut face.
  *
- * @param ray of unit direction
- * @param specimen from um to the room, in which the meshes are
+ * @param ray with a direction of unit length
+ * @param specimen from um to the scene, in which the meshes are
  */
 export function probeSurfaces(
   ray: Ray,
@@ -104,9 +104,9 @@ function isInside({ face, object }: Intersection<Mesh>, direction: Vector3): boo
 }
 
 /**
- * The place that is seen of the volumes along a ray.
+ * Returns the visible place of the volumes along a ray; null if they are too transparent there.
  *
- * @param ray of unit direction
+ * @param ray with a direction of unit length
  */
 export function probeVolumes(
   ray: Ray,
@@ -131,7 +131,7 @@ export function probeVolumes(
 
 type Sample = Readonly<{ t: number; alpha: number; tile: string; channel: string }>;
 
-/** Opacity of each step through a tile, and the channel that has most of it. */
+/** Returns the opacity of each step through a tile, and the channel with the largest opacity. */
 function sampleTile(
   ray: Ray,
   channels: readonly ProbedVolume[],
@@ -165,7 +165,7 @@ function sampleTile(
   return samples;
 }
 
-/** Part of the ray inside a volume's box, wherever in the stage it was moved. */
+/** Returns the part of the ray inside a volume's box, after the stage's transformation of the tile. */
 function spanOf(ray: Ray, { matrix, bounds_um }: TileVolume): Span | null {
   const toTile = new Matrix4().fromArray(matrix).invert();
   const origin = new Vector3(...ray.origin).applyMatrix4(toTile);
@@ -174,7 +174,7 @@ function spanOf(ray: Ray, { matrix, bounds_um }: TileVolume): Span | null {
   return boxSpan(AHEAD, local, bounds_um);
 }
 
-/** The shortest edge of a texel, um. */
+/** Returns the shortest edge of a texel, um. */
 function voxelOf({ bounds_um, size, apron }: TileVolume, texels: readonly number[]): number {
   const edges = size.map((n, i) => {
     const intervals = Math.max(1, n - 1 - 2 * apron);
@@ -184,7 +184,7 @@ function voxelOf({ bounds_um, size, apron }: TileVolume, texels: readonly number
   return Math.min(...edges.filter((edge) => edge > 0));
 }
 
-/** The point, or for one that lies a little outside the volume's box its nearest; null: too far. */
+/** Returns the point, or the nearest one in the volume's box; null if the point is too far outside. */
 export function nearestIn(
   { bounds_um, matrix, size, apron }: TileVolume,
   point: Vec3,
@@ -206,7 +206,7 @@ function isInCone(point: Vec3, { apex_um, axis_um, cosine }: Cone): boolean {
   return from.dot(axis_um) > cosine * from.length();
 }
 
-/** Where the ray enters the first tile, as far as it is kept. */
+/** Returns the place where the ray enters the first tile that is not cut away there. */
 export function probeBoxes(ray: Ray, tiles: readonly BoxedTile[], clip: Clip): Probed | null {
   const met = pickTile(ray, tiles, clip);
   if (met === null) return null;

@@ -1,4 +1,4 @@
-/** The specimen where a ray meets it: surface, volume or tile, and the channels' values. */
+/** Reads the specimen where a ray meets it: surface, volume or tile, and the channels' values. */
 
 import type { Matrix4 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -24,34 +24,34 @@ import {
 } from "./probe";
 import { levelAtHand, TexelCache } from "./texel_cache";
 
-/** Most texels of the level in which the reader looks for a ray's hit. */
+/** Largest number of texels of the level in which the reader looks for a ray's hit. */
 const PROBED_TEXELS = 2 * 1024 * 1024;
 
 export type ReadingOptions = Readonly<{
   manifest: Manifest;
   /** Address of the bundle's manifest. */
   base: string;
-  /** On screen now. */
+  /** The surfaces on screen. */
   surfaces: () => readonly ShownSurface[];
   volumes: () => readonly ShownVolume[];
-  /** null: not known yet, or there is none. */
+  /** Returns the volume of a channel; null if it is not known yet, or does not exist. */
   source: (tile: string, channel: string) => LevelSource | null;
-  /** The same, once it is known. */
+  /** Resolves with the volume of a channel once it is known; null if it does not exist. */
   sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
-  /** Voxels as they were measured; null: the host has none. */
+  /** The measured values of voxels; null if the host does not have them. */
   values: ValuesHost | null;
-  /** The nearest place where a ray meets something else that shows; null: none. */
+  /** Returns the nearest place where a ray meets anything else that is shown; null if there is none. */
   pick?: (ray: Ray) => Probed | null;
-  /** Planes before which the specimen is cut away for an eye. */
+  /** Returns the planes of slices in front of which the specimen is cut away for an eye. */
   corner?: (eye: Vec3) => readonly ClipPlane[] | undefined;
   onError: (error: unknown) => void;
 }>;
 
 export class Reading {
   state: ViewerState;
-  /** From um to the room, in which the surfaces are; null before the first frame. */
+  /** From um to the scene, in which the surfaces are; null before the first frame. */
   specimen: Matrix4 | null = null;
-  /** Where volumes show in disc mode. */
+  /** The cone in which volumes show in disc mode. */
   disc: Cone | null = null;
   private readonly cache: TexelCache;
   private isDisposed = false;
@@ -64,7 +64,7 @@ export class Reading {
     this.cache = new TexelCache((volume) => new VolumeSource(options.base, volume));
   }
 
-  /** What a ray (um) means; null: it meets no surface, no volume and no slice. */
+  /** Returns the nearest hit of a ray (um); null if it meets no surface, no volume and no slice. */
   async probe(ray: Ray): Promise<Probed | null> {
     const along = unitRay(ray);
     const surface = this.probeSurfaces(along);
@@ -78,7 +78,7 @@ export class Reading {
     return met.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
   }
 
-  /** The same, but at once and without volumes. */
+  /** Returns a hit at once: of a surface, otherwise of a tile's box. Volumes are ignored. */
   glance(ray: Ray): Probed | null {
     const along = unitRay(ray);
     const clip = this.clipFor(along);
@@ -86,7 +86,7 @@ export class Reading {
     return this.probeSurfaces(along) ?? probeBoxes(along, this.tiles, clip);
   }
 
-  /** A line for each shown channel: its name and its value at a point, on the source's scale. */
+  /** Returns a line for each shown channel: its name and its value at a point, on the source's scale. */
   async valuesAt(point: Vec3): Promise<readonly string[]> {
     const tile = this.tileAt(point);
     const lines = await Promise.all(
@@ -105,7 +105,7 @@ export class Reading {
     return lines.flat();
   }
 
-  /** The voxel's value where the host has the stage; null: it has not, or is out of reach. */
+  /** Returns the voxel's measured value; null if the host has no measured values, or can't be reached. */
   private async measuredAt(volume: TileVolume, channel: string, point: Vec3) {
     const { values } = this.options;
     const voxel = values === null || volume.measured === undefined ? null : voxelAt(volume, point);
@@ -113,7 +113,7 @@ export class Reading {
     return values.ask(volume.tile, channel, voxel).catch(() => null);
   }
 
-  /** What these values depend on: they may differ only if this does. */
+  /** Returns a key of the levels from which values are read; values at the points change only if the key changes. */
   sourcesKey(points: readonly Vec3[]): string {
     const known = points.flatMap((point) => {
       const tile = this.tileAt(point);
@@ -125,7 +125,7 @@ export class Reading {
     return known.join();
   }
 
-  /** What is cut away, also by slices: the corner before them, as seen from where the ray begins. */
+  /** Returns the clip, including the corner in front of slices as seen from the ray's origin. */
   private clipFor({ origin }: Ray): Clip {
     return { ...this.state.clip, corner: this.options.corner?.(origin) };
   }
@@ -161,7 +161,7 @@ export class Reading {
     return this.options.manifest.channels.filter(({ id }) => shown.has(id));
   }
 
-  /** null after a fault, which was reported. */
+  /** Returns the promise's value; reports a fault, and then returns null. */
   private async orReport<T>(promise: Promise<T>): Promise<T | null> {
     try {
       return await promise;

@@ -46,7 +46,7 @@ beforeEach(() => {
   vi.mocked(decodeTexels).mockClear();
 });
 
-it("takes the finest level at hand that is small enough", async () => {
+it("takes the finest available level that is small enough", async () => {
   const source = sourceOf(volumeOf("a", [64, 32, 16]), [2, 1]);
   expect(levelAtHand(source)).toBe(1);
   expect(levelAtHand(source, 5000)).toBe(2);
@@ -57,14 +57,14 @@ it("takes the finest level at hand that is small enough", async () => {
   expect(decodeTexels).toHaveBeenCalledTimes(1);
 });
 
-it("fetches a moderate level where none is at hand", async () => {
+it("fetches a level of moderate size if none is available", async () => {
   const cache = new TexelCache(reopen);
   const level = await cache.best(sourceOf(volumeOf("a", [256, 128, 64]), []));
   expect(level.size).toEqual([128, 128, 128]);
   expect(level.texels[0]).toBe(1);
 });
 
-it("decodes what is asked for again only once, and forgets what was long not used", async () => {
+it("decodes a repeatedly requested level only once, and drops the least recently used one", async () => {
   const cache = new TexelCache(reopen);
   const side = Math.cbrt(27 * MIB);
   const [a, b, c] = ["a", "b", "c"].map((name) => sourceOf(volumeOf(name, [side]), [0]));
@@ -72,7 +72,7 @@ it("decodes what is asked for again only once, and forgets what was long not use
   await cache.best(b);
   await cache.best(a);
   expect(decodeTexels).toHaveBeenCalledTimes(2);
-  await cache.best(c); // 81 MiB: b goes
+  await cache.best(c); // with 81 MiB in the cache, b is dropped
   await cache.best(a);
   expect(decodeTexels).toHaveBeenCalledTimes(3);
   await cache.best(b);

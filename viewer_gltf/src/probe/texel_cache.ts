@@ -1,6 +1,6 @@
 /**
- * Texels of the volumes for the CPU. On the GPU they can't be read, so a level that is at hand is
- * decompressed again, in the worker; the last few stay.
+ * Provides texels of the volumes to the CPU. Texels on the GPU can't be read back, so an available level is decompressed
+ * again in the worker. The most recently used levels stay in memory.
  */
 
 import { decodeTexels } from "../bundle/decode";
@@ -9,14 +9,14 @@ import type { LevelSource } from "../state/on_screen";
 import { levelsToFetch, texels } from "../voxels/mip_levels";
 import type { VolumeLevel } from "./measure";
 
-/** Most bytes of memory, beside the texels that were asked for last. */
+/** Largest size of the cache, bytes; the level that was requested last is kept even if it is larger. */
 const KEPT_BYTES = 64 * 1024 * 1024;
-/** Most texels of a level that is fetched where none is at hand. */
+/** Largest number of texels of a level that is fetched if none is available. */
 const FETCHED_TEXELS = 4 * 1024 * 1024;
 
 type Kept = Readonly<{ bytes: number; level: Promise<VolumeLevel> }>;
 
-/** The finest level at hand of at most so many texels; null: none. */
+/** Returns the finest available level of at most `most` texels; null if there is none. */
 export function levelAtHand(source: LevelSource, most = Number.POSITIVE_INFINITY): number | null {
   const { levels } = source.volume;
   const index = levels.findIndex((level, i) => source.has(i) && texels(level) <= most);
@@ -27,16 +27,16 @@ export class TexelCache {
   private readonly kept = new Map<string, Kept>();
   private readonly abort = new AbortController();
 
-  /** @param reopen a source of the same volume that keeps what it fetches for itself */
+  /** @param reopen makes another source of the same volume, whose fetched levels the shown one does not see */
   constructor(private readonly reopen: (volume: TileVolume) => LevelSource) {}
 
-  /** The finest level at hand; if there is none, null. Throws BundleError. */
+  /** Returns the finest available level of at most `most` texels; null if there is none. Throws BundleError. */
   async atHand(source: LevelSource, most?: number): Promise<VolumeLevel | null> {
     const index = levelAtHand(source, most);
     return index === null ? null : this.decoded(source, index);
   }
 
-  /** The finest level at hand; if there is none, one is fetched. Throws BundleError, AbortError. */
+  /** Returns the finest available level; fetches one if there is none. Throws BundleError, AbortError. */
   async best(source: LevelSource): Promise<VolumeLevel> {
     const index = levelAtHand(source);
     if (index !== null) return this.decoded(source, index);
@@ -45,7 +45,10 @@ export class TexelCache {
     return this.decoded(this.reopen(source.volume), order[order.length - 1]);
   }
 
-  /** The finest level of at most so many texels, or the coarsest; fetched, if need be. Throws BundleError, AbortError. */
+  /**
+   * Returns the finest level of at most `most` texels, or the coarsest; fetches it if needed. Throws BundleError,
+   * AbortError.
+   */
   within(source: LevelSource, most: number): Promise<VolumeLevel> {
     const { levels } = source.volume;
     const found = levels.findIndex((level) => texels(level) <= most);
@@ -57,7 +60,7 @@ export class TexelCache {
     const { file, levels } = source.volume;
     const key = `${file.path} ${file.sha256} ${index}`;
     const before = this.kept.get(key);
-    this.kept.delete(key); // and to the end: the last one used
+    this.kept.delete(key); // adding the level again at the end makes it the most recently used
     const bytes = texels(levels[index]);
     const level = before?.level ?? this.decode(source, index, bytes);
     this.kept.set(key, { bytes, level });

@@ -1,8 +1,8 @@
 /**
- * The page's address follows the view, so that a reload brings the view back.
+ * Keeps the page's address equal to a link to the view, so that a reload restores the view.
  *
- * The address changes once the view has been the same for two looks in a row, half a second apart. That is at most
- * once a second; Safari refuses more than a hundred changes in 30 s.
+ * The address changes once two checks in a row, half a second apart, have found the same view. That is at most once a
+ * second; Safari refuses more than a hundred changes in 30 s.
  */
 
 import type { PartHost } from "../host/part";
@@ -18,15 +18,15 @@ import { untypedNames } from "./untyped_names";
 
 const LOOK_MS = 500;
 
-/** `camera`: null where the specimen is seen as the page opens without a link. */
+/** A view; `camera` is null if the camera is where a page without a link opens. */
 type Seen = Readonly<{ state: ViewerState; camera: CameraView | null }>;
-/** The view that the address has opened, before anybody changed it. */
+/** The view that the address has opened, before any change. */
 export type Opened = Seen;
 
-/** A link that looks from somewhere. */
+/** Matches a link that contains a camera. */
 const HAS_CAMERA = /[#&]eye=/;
 
-/** Whether the address of a page follows its view: not that of a mere picture in another page. Pure. */
+/** Returns whether a page's address follows its view. A page without a panel in another page's frame does not. Pure. */
 export function follows(search: string, isFramed: boolean): boolean {
   const asked = new URLSearchParams(search);
   const isPicture = isFramed && asked.get("panel") === "off";
@@ -39,11 +39,11 @@ function isSame(a: Seen, b: Seen): boolean {
 
 export class AddressBar {
   private readonly timer = setInterval(() => this.look(), LOOK_MS);
-  /** The view at the last look. */
+  /** The view at the last check. */
   private seen: Seen;
-  /** The view that the address has. */
+  /** The view that the address describes. */
   private written: Seen;
-  /** The link to the view that the page has opened with, and what stood in the address then. */
+  /** The link to the view that the page has opened with, and the hash of the address at that time. */
   private readonly opening: Readonly<{ link: string; hash: string }>;
 
   constructor(
@@ -51,14 +51,14 @@ export class AddressBar {
     { state, camera }: Opened,
   ) {
     const { hash } = location;
-    // a page that was loaded again in the split screen is left in its step of the history
+    // A page that was reloaded in the split screen is still at that step of the history, but no longer split.
     if (!host.isInRoom && isPassingStep()) history.replaceState(null, "");
     this.seen = this.now;
     this.written = { state, camera: HAS_CAMERA.test(hash) ? camera : null };
     this.opening = { link: this.linkTo(this.written), hash };
   }
 
-  /** Bring the address to the view at once, as before a reload. */
+  /** Updates the address at once, for example before a reload. */
   write(): void {
     const { now } = this;
     if (this.host.isInRoom || isPassingStep() || !isOwnAddress()) return;
@@ -75,7 +75,7 @@ export class AddressBar {
       if (!isOpening) keepTyped(link === open ? null : link);
     } catch (error) {
       if (!(error instanceof DOMException)) throw error;
-      clearInterval(this.timer); // this document has no address that could change
+      clearInterval(this.timer); // the browser does not let this document change its address
     }
   }
 
@@ -97,7 +97,7 @@ export class AddressBar {
     return { state, camera: isHome ? null : camera };
   }
 
-  /** The state in which the page opens with what stands before the `#`. */
+  /** The state in which the page opens with the part of its address before the `#`. */
   private get start(): ViewerState {
     const start = initialState(this.host.bundle.manifest);
     return settingsOf(location.search).reduce(reduce, start);
@@ -107,7 +107,7 @@ export class AddressBar {
     return linkOf(this.host, this.start, seen);
   }
 
-  /** Whether the viewer reads all of a link: one that is too long is no use. */
+  /** Returns whether the viewer can read a link without a notice; it refuses one that is too long. */
   private isRead(link: string): boolean {
     const { bundle, state } = this.host;
     const { actions } = readLink(link, state, bundle.manifest.specimen.bounds_um);

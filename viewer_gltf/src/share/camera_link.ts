@@ -1,15 +1,15 @@
-/** From where the specimen is seen, in an address. Metres of the room. Pure. */
+/** Writes and reads the camera in an address, in metres of the scene. Pure. */
 
 import { LARGEST_SCALE, SMALLEST_SCALE } from "../math/grab";
 import type { CameraView, SpecimenPlacement } from "../state/camera_view";
 import { readNumbers, written } from "./numbers";
 
-/** Farthest place in the room, m: the user finds nothing beyond it. */
+/** Largest coordinate in the scene, m; the user would not find a specimen beyond it. */
 const FARTHEST_M = 100;
-/** Least distance of a camera from its target, m: closer it has no direction. */
+/** Smallest distance between a camera and its target, m; closer together, they define no direction. */
 const NEAREST_M = 1e-4;
 
-/** `eye`, and `pose` where the specimen was moved. */
+/** Returns the parameter `eye`, and `pose` if the specimen was moved. */
 export function writeLook({ position, target, specimen }: CameraView): Record<string, string> {
   const eye = written([...position, ...target]);
   if (specimen === null) return { eye };
@@ -17,7 +17,7 @@ export function writeLook({ position, target, specimen }: CameraView): Record<st
   return { eye, pose };
 }
 
-/** null: there is none, or none that shows anything. */
+/** Reads a camera; null if it can't be read, or would not show anything. */
 export function readLook(eye: string, pose: string | null): CameraView | null {
   const camera = readNumbers(eye, 6);
   const specimen = pose === null ? null : readSpecimen(pose);

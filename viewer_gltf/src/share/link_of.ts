@@ -1,4 +1,4 @@
-/** The link to the view that a viewer shows. */
+/** Makes the link to the view that the viewer shows. */
 import type { PartHost } from "../host/part";
 import type { CameraView } from "../state/camera_view";
 import type { ObjectView } from "../state/objects";
@@ -6,8 +6,8 @@ import type { ViewerState } from "../state/viewer_state";
 import { writeLink } from "./permalink";
 
 /**
- * @param start the state in which the page opens; a link holds what differs from it
- * @param view another view than the present one
+ * @param start the state in which the page opens; a link contains only differences from it
+ * @param view a camera in place of the present one
  */
 export function linkOf(
   host: PartHost,
@@ -23,7 +23,7 @@ export function linkOf(
   return writeLink(view.state, start, view.camera, linked);
 }
 
-/** Number of objects in lists that are too long for a link. */
+/** Returns the number of objects in lists that are too long for a link. */
 export function leftOutOfLink(host: PartHost): number {
   const objects = host.service("objects");
   return Object.entries(host.state.objects).reduce(

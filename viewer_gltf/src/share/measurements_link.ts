@@ -1,6 +1,6 @@
 /**
- * Measurements in an address: `d:Name:x,y,z,x,y,z+a:...`, each a kind (d(istance), a(ngle), l(ine)), its
- * name and its points in um. Pure.
+ * Writes and reads measurements in an address: `d:Name:x,y,z,x,y,z+a:...`. Each has a kind (d(istance), a(ngle) or
+ * l(ine)), a name and its points in um. Pure.
  */
 import type { Vec3 } from "../math/vec3";
 import {
@@ -19,7 +19,7 @@ const LETTERS: readonly (readonly [string, MeasureKind])[] = [
   ["l", "line"],
 ];
 
-/** The list as text, and the points of the newest one: those of a distance have a part of their own. */
+/** Returns the list as text. An unfinished measurement or a new distance is not in it: its points are returned, too. */
 export function linkedMeasurements(state: Measuring): readonly [string, readonly Vec3[]] {
   const { measured, measuredAs, measureKind, measurements } = state;
   const isDone = missing(measuredAs, measured) === 0;

@@ -1,9 +1,9 @@
-/** Numbers in an address: short when written, harmless when read. Pure. */
+/** Writes numbers of an address in short form, and checks them when it reads them. Pure. */
 
-/** Largest number in a view: um of a metre-sized specimen, or metres of the room. */
+/** Largest number in a view: um of a specimen ten metres long, or metres of the scene. */
 const LARGEST = 1e7;
 const DIGITS = 6;
-/** Numbers below this are 0 (um of the specimen, m of the room): a turn's rounding leaves them. */
+/** Numbers below this (um of the specimen, m of the scene) count as 0; they come from rounding in rotations. */
 const NOTHING = 1e-6;
 
 export function written(values: readonly number[]): string {
@@ -11,7 +11,7 @@ export function written(values: readonly number[]): string {
   return values.map((value) => (Math.abs(value) < NOTHING ? "0" : text(value))).join(",");
 }
 
-/** Exactly so many numbers, all finite; null: anything else. */
+/** Reads exactly `count` finite numbers; null for any other text. */
 export function readNumbers(text: string, count: number): readonly number[] | null {
   const parts = text.split(",", count + 1);
   if (parts.length !== count) return null;

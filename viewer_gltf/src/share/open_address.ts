@@ -5,7 +5,7 @@ import { setTo } from "../state/parameters/kinds";
 import { isTraced, SWITCH_DISTANCE } from "../state/parameters/volumes";
 import { settingsOf, standOf } from "./page_parameters";
 
-/** Least switch distance at the opening, as a multiple of the eye's distance from the middle. */
+/** Smallest volume distance when the page opens, as a multiple of the eye's distance from the specimen's centre. */
 const NEAR_AT_START = 1.1;
 
 const NOT_LOADED =
@@ -17,7 +17,7 @@ export type LinkReader = (
   bounds_um: Parameters<typeof import("./permalink").readLink>[2],
 ) => ReturnType<typeof import("./permalink").readLink>;
 
-/** Returns a reader of a link; its code loads only where there is a link. Rejects with a BundleError. */
+/** Returns a function that reads a link; its code loads only if there is a link. Rejects with a BundleError. */
 export async function loadLink(link: string): Promise<LinkReader> {
   if (link.length < 2) return () => ({ actions: [], camera: null });
   const { readLink } = await import("./permalink").catch((cause) => {
@@ -33,8 +33,8 @@ export function openAddress(host: PartHost, search: string, readLink: LinkReader
   const asked = [...settingsOf(search), ...actions];
   for (const action of asked) host.dispatch(action);
   const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
-  const stand = standOf(search); // what `reset` returns to, wherever a link looks from
-  host.display.fit(); // the panel has its place by now
+  const stand = standOf(search); // the viewpoint to which `reset` returns, also if a link opens another one
+  host.display.fit(); // the panel has been laid out by now
   if (stand !== null) viewpoint.openAt(stand);
   else if (camera === null) openSlowly(host, saysDistance);
   if (camera !== null) viewpoint.lookFrom(camera);
@@ -42,13 +42,13 @@ export function openAddress(host: PartHost, search: string, readLink: LinkReader
   host.undo.forget();
 }
 
-/** Shows all of the specimen, near enough for volumes, and slowly turning until someone touches it. */
+/** Shows the whole specimen, near enough for volumes to show, and turns it slowly until a user touches it. */
 function openSlowly(host: PartHost, saysDistance: boolean): void {
   const { viewpoint } = host;
   const away_m = NEAR_AT_START * viewpoint.openingDistance_m;
   const isFar = away_m > host.state.switchDistance_m;
   if (isFar && !saysDistance) host.dispatch(setTo(SWITCH_DISTANCE, away_m));
-  // light is gathered while nothing moves
+  // The path tracer gathers light only while nothing moves.
   const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
   if (!isCalm && !isTraced(host.state)) viewpoint.turnSlowly();
   host.display.redraw();

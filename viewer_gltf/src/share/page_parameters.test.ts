@@ -12,7 +12,7 @@ describe("the page's address", () => {
     expect(settingsOf("?bundle=x")).toEqual([]);
   });
 
-  it("chooses a light or a dark page, which follows the system otherwise", () => {
+  it("chooses a light or a dark page; without it the page follows the system", () => {
     for (const isSystemLight of [true, false]) {
       expect(isLight("?theme=light", isSystemLight)).toBe(true);
       expect(isLight("?theme=dark", isSystemLight)).toBe(false);
@@ -21,7 +21,7 @@ describe("the page's address", () => {
     }
   });
 
-  it("chooses a background of one colour, as readers have who ask for more contrast", () => {
+  it("chooses a background of one colour, which users who prefer more contrast also get", () => {
     expect([isPlain("?backdrop=plain", false), isPlain("", true), isPlain("", false)]).toEqual([
       true,
       true,
@@ -29,7 +29,7 @@ describe("the page's address", () => {
     ]);
   });
 
-  it("is reported where it can't be read", () => {
+  it("is reported if it can't be read", () => {
     expect(settingsOf("?mode=cube&switch=&disc=wide")).toEqual([
       {
         type: "notify",

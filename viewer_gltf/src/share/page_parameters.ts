@@ -1,6 +1,6 @@
 /**
- * What the page's address asks for: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
- * high), `switch` (metres of the room), `disc` (degrees), `stereo` (off, anaglyph, side-by-side), `view` (front,
+ * Reads the settings in the page's address: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
+ * high), `switch` (metres of the scene), `disc` (degrees), `stereo` (off, anaglyph, side-by-side), `view` (front,
  * side, top), `panel` (off), `theme` (light, dark), `backdrop` (plain). Pure.
  */
 import { NAMED_VIEWS, type NamedView } from "../interaction/named_views";
@@ -9,42 +9,42 @@ import { type Parameter, setTo, type Value } from "../state/parameters/kinds";
 import { parametersInAddress } from "../state/parameters/table";
 import type { ViewerState } from "../state/viewer_state";
 
-/** Their names: a link to a view leaves them out, it has them itself. */
+/** Names of the settings. A link to a view removes them from the page's address, since it contains their values. */
 export const settingNames = (): readonly string[] => [
   ...parametersInAddress().flatMap(({ link }) => link ?? []),
   "view",
 ];
 
-/** The view that the page opens with; null: the usual one. */
+/** Returns the named view with which the page opens; null for the default one. */
 export function standOf(search: string): NamedView | null {
   const asked = new URLSearchParams(search).get("view");
   return NAMED_VIEWS.find((stand) => stand === asked) ?? null;
 }
 
-/** Whether the page has a panel: `panel=off` leaves it out, for a page that holds this one in a frame. */
+/** Returns whether the page has a panel. `panel=off` removes it, for use in another page's frame. */
 export function panelOf(search: string): "on" | "off" {
   return new URLSearchParams(search).get("panel") === "off" ? "off" : "on";
 }
 
-/** Whether the page and its background are light: as `theme=` says, or else as the system has it. */
+/** Returns whether the page and its background are light: by `theme=`, otherwise by the system's setting. */
 export function isLight(search: string, isSystemLight: boolean): boolean {
   const asked = new URLSearchParams(search).get("theme");
   return asked === "light" || (asked !== "dark" && isSystemLight);
 }
 
-/** Whether the background is of one colour: as `backdrop=plain` says, or for a reader who asks for more contrast. */
+/** Returns whether the background has one colour: with `backdrop=plain`, or if the user prefers more contrast. */
 export function isPlain(search: string, asksForContrast: boolean): boolean {
   return asksForContrast || new URLSearchParams(search).get("backdrop") === "plain";
 }
 
-/** null: none of the parameter's. */
+/** Returns the value for a text; null if the parameter has no such value. */
 function valueIn(row: Parameter<ViewerState>, text: string): Value | null {
   if (row.kind === "choice") return row.values.find((each) => each === text) ?? null;
   const value = Number(text);
   return text.trim() !== "" && Number.isFinite(value) ? value : null;
 }
 
-/** The actions that bring a state there; one more reports unreadable settings. */
+/** Returns the actions that apply the settings, and one that reports unreadable settings. */
 export function settingsOf(search: string): readonly Action[] {
   const asked = new URLSearchParams(search);
   return parametersInAddress().flatMap((row): readonly Action[] => {

@@ -1,9 +1,9 @@
-/** Parameters as words of a link, and back. Pure. */
+/** Converts parameters to words of a link, and back. Pure. */
 import { fromHex, toHex } from "../math/color";
 import { type Parameter, type SetAction, setTo, type Value } from "../state/parameters/kinds";
 import { readNumbers, written } from "./numbers";
 
-/** The words for a switch that is off and for one that is on. */
+/** The words for a switch that is off, and for one that is on. */
 export type SwitchWords = readonly [off: string, on: string];
 
 function wordOf<On>(row: Parameter<On>, on: On, words: SwitchWords): string {
@@ -19,7 +19,7 @@ function wordOf<On>(row: Parameter<On>, on: On, words: SwitchWords): string {
   }
 }
 
-/** The value that a word stands for; null: none. */
+/** Returns the value that a word stands for; null if there is none. */
 function valueIn<On>(row: Parameter<On>, word: string, words: SwitchWords): Value | null {
   switch (row.kind) {
     case "number":
@@ -38,7 +38,7 @@ function isSame<On>(row: Parameter<On>, a: On, b: On): boolean {
   return row.get(a) === row.get(b);
 }
 
-/** Names and words of those that differ from what a bundle opens with, but for what stays with the user. */
+/** Returns names and words of the parameters that differ from the opening state. Some always stay with the user. */
 export function writeWords<On>(
   rows: readonly Parameter<On>[],
   on: On,
@@ -52,7 +52,7 @@ export function writeWords<On>(
   });
 }
 
-/** The action that a word asks for; null: it can't be read. */
+/** Returns the action that a word stands for; null if the word can't be read. */
 export function readWord<On>(
   row: Parameter<On>,
   word: string,

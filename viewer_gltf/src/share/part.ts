@@ -1,4 +1,4 @@
-/** The link to the view as a part of the viewer: in the clipboard, in the address bar and in the panel. */
+/** A part of the viewer: puts the link to the view into the clipboard, the address bar and the panel. */
 import { hasAddress, pageAddress } from "../bundle/address";
 import { copyText } from "../dom/clipboard";
 import { NOT_LOADED } from "../host/later";
@@ -16,11 +16,11 @@ class SharePart implements Part, Links {
   readonly services = { links: this };
   readonly commands = { share: () => void this.share() };
 
-  /** The code that writes links; null until a link is first wanted. */
+  /** The code that writes links; null until the first link is written. */
   private code: LinkWriter | null = null;
-  /** The view that the address has opened; null: it is not open yet. */
+  /** The view that the address has opened; null until it is open. */
   private opened: Opened | null = null;
-  /** null: the address stays as it is. */
+  /** null if the address does not follow the view. */
   private addressBar: AddressBar | null = null;
 
   constructor(private readonly host: PartHost) {}
@@ -30,7 +30,7 @@ class SharePart implements Part, Links {
     this.opened = { state, camera: viewpoint.cameraView };
   }
 
-  /** The address follows the view from now on, where it may. */
+  /** Lets the address follow the view from now on, unless that is turned off. */
   async afterOverview(): Promise<void> {
     const { opened } = this;
     if (opened === null || !hasAddress()) return;
@@ -67,7 +67,7 @@ class SharePart implements Part, Links {
     const address = new URL(pageAddress());
     for (const name of settingNames()) address.searchParams.delete(name);
     address.hash = linkOf(host, initialState(host.bundle.manifest));
-    // the address follows the view once the split screen is left
+    // In the split screen the address stays; it follows the view again afterwards.
     if (hasAddress() && !isPassingStep()) writeAddress(address);
     host.panel.show({ link: address.href });
     host.panel.unfold("share");
@@ -82,7 +82,7 @@ class SharePart implements Part, Links {
     } else if (await copyText(address.href)) {
       host.announce(`The link is in the clipboard.${but}`);
     } else {
-      host.service("page")?.focus("share", "link"); // which selects it
+      host.service("page")?.focus("share", "link"); // focusing the field selects the link
       host.announce(`Here is the link, selected: copy it by Ctrl+C, or by a long press.${but}`);
     }
   }

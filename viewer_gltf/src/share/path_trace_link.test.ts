@@ -21,7 +21,7 @@ function read(text: string): ViewerState {
   return (actions as Action[]).reduce<ViewerState>(reduce, START);
 }
 
-/** Any settings that a panel can make. */
+/** Random settings that a user could make in the panel. */
 function anySettings(random: () => number): ViewerState {
   const actions: Action[] = [
     { type: "set", id: "trace-room", value: random() < 0.5 ? "sky" : "studio" },
@@ -44,17 +44,17 @@ function anySettings(random: () => number): ViewerState {
 }
 
 describe("the light in a link", () => {
-  it("is nothing where it is what a bundle opens with", () => {
+  it("is empty if it is the light with which a bundle opens", () => {
     expect(write(START)).toBe("");
   });
 
-  it("comes back as it was, whatever was set", () => {
+  it("is the same after writing and reading, for any settings", () => {
     const random = seeded(4);
     for (let i = 0; i < 200; i++) {
       const state = anySettings(random);
       const { trace } = state;
       const text = write(state);
-      expect(text).toMatch(/^[-a-zA-Z0-9_:,./+]*$/); // nothing that an address would change
+      expect(text).toMatch(/^[-a-zA-Z0-9_:,./+]*$/); // no character that an address would escape
       const back = text === "" ? START : read(text);
       for (const row of LIGHT_NUMBERS) {
         expect(row.get(back), row.id).toBeCloseTo(row.get(state), 4);
@@ -76,7 +76,7 @@ describe("the light in a link", () => {
     }
   });
 
-  it("written by an earlier version, in another order, reads the same", () => {
+  it("reads the same if an earlier version wrote it in another order", () => {
     const { trace } = read(
       "bias:0.25,lamp-1/x:2.5,exposure:1.5,room:sky,tone:none,many:false,after:false,lamp-1:true,lamp-1/color:ff8800",
     );
@@ -85,12 +85,12 @@ describe("the light in a link", () => {
     expect(trace.lamps[1]).toMatchObject({ x: 2.5, isOn: true, color: fromHex("#ff8800") });
   });
 
-  it("leaves the user's own picture of light with the user", () => {
+  it("leaves out the user's own environment image", () => {
     expect(write({ ...START, trace: { ...START.trace, environment: "own" } })).toBe("");
     expect(readLight("room:own")).toEqual([null]);
   });
 
-  it("that can't be read is reported, part by part", () => {
+  it("is reported part by part if it can't be read", () => {
     for (const part of [
       "",
       "bias",
@@ -119,7 +119,7 @@ describe("the light in a link", () => {
     expect([one, none, other].map((action) => action !== null)).toEqual([true, false, true]);
   });
 
-  it("never leads beyond the limits, nor throws, whatever it holds", () => {
+  it("never exceeds the limits of parameters, and never throws, for any text", () => {
     const random = seeded(9);
     const pieces = [
       ...LIGHT_NUMBERS.map(({ link }) => link),

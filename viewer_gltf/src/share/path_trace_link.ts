@@ -1,6 +1,6 @@
 /**
- * The path-traced picture's settings in a link: `light=bias:0.1,lamp-0/x:1,...` Only what differs
- * from what a bundle opens with. Pure.
+ * Writes and reads the settings of path tracing in a link: `light=bias:0.1,lamp-0/x:1,...` A link contains only
+ * differences from the opening state. Pure.
  */
 import type { SetAction } from "../state/parameters/kinds";
 import { LIGHT } from "../state/parameters/light";
@@ -15,7 +15,7 @@ export function writeLight(state: ViewerState, start: ViewerState): string {
     .join(",");
 }
 
-/** The actions that a link's words ask for; null: they can't be read. */
+/** Returns the action for each of a link's words; null for a word that can't be read. */
 export function readLight(text: string): readonly (SetAction | null)[] {
   return text.split(",").map((part) => {
     const at = part.indexOf(":");

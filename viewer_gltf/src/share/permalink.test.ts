@@ -19,7 +19,7 @@ const CHANGES: readonly Action[] = [
   { type: "show", channel: "c1", shown: false },
   { type: "show", channel: "c5", shown: true },
   { type: "set", id: "color", channel: "c5", value: fromHex("#12ab9f") },
-  { type: "set", id: "color", channel: "c4", value: fromHex("#0000ff") }, // hidden, and yet of the state
+  { type: "set", id: "color", channel: "c4", value: fromHex("#0000ff") }, // hidden, but still part of the state
   { type: "set", id: "opacity", channel: "c0", value: 0.35 },
   { type: "window", channel: "c0", window: [0.125, 0.75] },
   { type: "set", id: "volume", channel: "c2", value: false },
@@ -53,7 +53,7 @@ const CAMERA: CameraView = {
   target: [0.1, 0, -0.05],
   specimen: { position: [0, 0, -1.5], orientation: [0, 0.6, 0, 0.8], scale: 2.5 },
 };
-/** A view, without the notices and without the time for which each channel has been shown. */
+/** Returns a view without its notices and without the order in which channels were shown. */
 const viewOf = (state: ViewerState) => ({
   ...state,
   notices: [],
@@ -61,7 +61,7 @@ const viewOf = (state: ViewerState) => ({
 });
 
 describe("a link to a view", () => {
-  it("brings back the whole state and the look", () => {
+  it("restores the whole state and the camera", () => {
     const state = after(start(), CHANGES);
     const hash = writeLink(state, start(), CAMERA);
     expect(viewOf(opened(hash))).toEqual(viewOf(state));
@@ -74,7 +74,7 @@ describe("a link to a view", () => {
     });
   });
 
-  it("brings back each single change", () => {
+  it("restores each single change", () => {
     for (const change of CHANGES) {
       const state = after(start(), [change]);
       const hash = writeLink(state, start(), null);
@@ -82,14 +82,14 @@ describe("a link to a view", () => {
     }
   });
 
-  it("leaves out what is as it opens, and is short", () => {
+  it("leaves out everything that equals the opening state, and is short", () => {
     expect(writeLink(start(), start(), null)).toBe("#v=1");
     const eye = { ...CAMERA, specimen: null };
     expect(writeLink(start(), start(), eye)).toBe("#v=1&eye=0.5,-0.25,1.75,0.1,0,-0.05");
     expect(writeLink(after(start(), CHANGES), start(), CAMERA).length).toBeLessThan(400);
   });
 
-  it("says of objects what the code that knows their table does, or what another link said", () => {
+  it("contains the objects' part as their own code writes it, or as an earlier link had it", () => {
     const linked = '{"picked":"7"}';
     const before = after(start(), [
       { type: "objects", channel: start().channels[0].id, change: { linked } },
@@ -101,7 +101,7 @@ describe("a link to a view", () => {
     expect(opened(writeLink(before, start(), null, (of) => of)).objects[id].linked).toBe(id);
   });
 
-  it("needs no escaping: a URL keeps it as it is", () => {
+  it("needs no escaping in a URL", () => {
     const hash = writeLink(after(start(), CHANGES), start(), CAMERA);
     const url = new URL("https://example.org/view/?bundle=x");
     url.hash = hash;
@@ -118,7 +118,7 @@ describe("a link to a view", () => {
     expect(opened(hash).channels.some(({ shown }) => shown)).toBe(false);
   });
 
-  it("reports channels and tiles that are not here, and shows the rest", () => {
+  it("reports channels and tiles that the bundle does not have, and shows the rest", () => {
     const state = opened("#v=1&c=c5,CD8&l=CD4:o0.5,c5:o0.5&tile=r9_c9&disc=20");
     expect(state.notices).toEqual([
       "Link: this bundle has no channel CD8, channel CD4, tile r9_c9.",
@@ -129,7 +129,7 @@ describe("a link to a view", () => {
     expect(state.selected).toBeNull();
   });
 
-  it("has the measurements with their names, and the slices", () => {
+  it("contains the measurements with their names, and the slices", () => {
     const changes: readonly Action[] = [
       {
         type: "set-measurements",
@@ -169,7 +169,7 @@ describe("a link to a view", () => {
     const hash = writeLink(state, start(), null);
     expect(new URL(hash, "https://host.test/").hash).toBe(hash);
     expect(viewOf(opened(hash))).toEqual(viewOf(state));
-    // the newest one too: an angle that is done goes to the list
+    // The newest measurement is included, too: a finished angle is added to the list.
     const angle = after(state, [
       { type: "set", id: "measure-kind", value: "angle" },
       {
@@ -185,12 +185,12 @@ describe("a link to a view", () => {
     expect(again.measurements.map(({ name }) => name)).toEqual(["wall: left; 1", "", "Angle 1"]);
   });
 
-  it("of another bundle altogether leaves the channels that open", () => {
+  it("shows the default channels if it comes from another bundle", () => {
     const shown = (state: ViewerState) => state.channels.map((channel) => channel.shown);
     expect(shown(opened("#v=1&c=CD8,CD4"))).toEqual(shown(start()));
   });
 
-  it("of a newer viewer, or of none, is reported and does nothing else", () => {
+  it("is only reported if a newer viewer wrote it, or no viewer", () => {
     expect(noticesOf("#v=2&disc=20")).toEqual(["Link: this viewer reads version 1, found 2."]);
     expect(noticesOf("#section-3")).toHaveLength(1);
     expect(opened("#v=2&disc=20").discRadius_deg).toBe(start().discRadius_deg);
@@ -232,7 +232,7 @@ describe("a link to a view", () => {
     expect(state).toEqual(opening);
   });
 
-  it("says nothing of the cut that the bundle opens with, and says where it was closed", () => {
+  it("leaves out the cut that the bundle opens with, and states if the user removed it", () => {
     const plain = sampleManifest(2);
     const cut = { normal: [1, 0, 0] as [number, number, number], offset_um: 3 };
     const start = initialState({ ...plain, specimen: { ...plain.specimen, cut } });
@@ -251,7 +251,7 @@ describe("a link to a view", () => {
     expect(state.measured).toEqual([[50, 0, 0]]);
   });
 
-  it("of ten kilobytes of junk is harmless", () => {
+  it("is harmless if it is ten kilobytes of junk", () => {
     const random = seeded(7);
     const letters = "v=1&cl,:~%00ff_.-+eye<>\"'{}[]\\ \u0000\ud800ctwon0129";
     for (let round = 0; round < 200; round++) {
@@ -265,11 +265,11 @@ describe("a link to a view", () => {
       const numbers = JSON.stringify(
         state.channels.map(({ window, opacity }) => [window, opacity]),
       );
-      expect(numbers).not.toContain("null"); // as JSON writes NaN
+      expect(numbers).not.toContain("null"); // JSON writes NaN as null
     }
   });
 
-  it("cut short anywhere still opens", () => {
+  it("still opens if it is cut short anywhere", () => {
     const hash = writeLink(after(start(), CHANGES), start(), CAMERA);
     for (let length = 0; length < hash.length; length++) {
       const state = opened(hash.slice(0, length));

@@ -1,17 +1,17 @@
 /**
- * A view as the part of an address behind `#`, and back. Pure.
+ * Converts a view to the part of an address after `#`, and back. Pure.
  *
  *   #v=1&c=DAPI,CD8&l=DAPI:c3050ff:o0.5,CD8:n&mode=tile&eye=0,0,1.8,0,0,0
  *
- * What is as the bundle opens is left out. `c`: the channels shown; `l`: channels that look
- * different, each with c(olour, sRGB) o(pacity) w(indow, low_high) s(hapes of a transfer function,
+ * A link contains only differences from the state in which the bundle opens. `c`: the channels shown; `l`: channels
+ * with a changed appearance, each with c(olour, sRGB) o(pacity) w(indow, low_high) s(hapes of a transfer function,
  * name_shapes: see shapes_link.ts) t(ransfer function) n(o volume).
- * Others: mode, switch (m), disc (degrees), tile, only (the isolated one), box (um, low and high
- * corner), cut (a plane's normal and offset; none: the opening cut is closed), points (um), measures (see
- * measurements_link.ts), views (kept ones, as eye), objects (of label maps: see objects/linked.ts), tool, dwell, quality, light (see
- * path_trace_link.ts), lamps (shown or not), eye and pose.
- * An address is somebody else's text: whatever it holds, the actions are ones that a user could
- * have taken; an unreadable part is reported and left out.
+ * Others: mode, switch (m), disc (degrees), tile, only (the isolated tile), box (um, low and high
+ * corner), cut (a plane's normal and offset; none: the opening cut is removed), points (um), measures (see
+ * measurements_link.ts), views (saved ones, in the form of eye), objects (of label maps: see objects/linked.ts), tool,
+ * dwell, quality, light (see path_trace_link.ts), lamps (shown or not), eye and pose.
+ * An address may come from anyone. Any text leads only to actions that a user could take, and an unreadable part is
+ * reported and left out.
  */
 
 import type { Box } from "../math/box";
@@ -36,24 +36,26 @@ import { readLight, writeLight } from "./path_trace_link";
 import { readShapes, writeShapes } from "./shapes_link";
 
 const VERSION = "1";
-const UNCUT = "none"; // in place of a plane: the cut that the specimen opens with is closed
-/** Longest link, characters: seventy channels that all look different take less. */
+const UNCUT = "none"; // in place of a plane: the user removed the cut with which the specimen opens
+/** Longest link, characters; enough for seventy channels that all have a changed appearance. */
 const LONGEST = 8000;
 const WORDS: SwitchWords = ["off", "on"];
-/** A switch of a channel: the letter alone means off. */
+/** Words for a channel's switches: the letter alone means off. */
 const CHANNEL_WORDS: SwitchWords = ["", "on"];
 const NAMED_APART: ReadonlySet<Parameter<ViewerState>> = new Set([...VOLUMES, ...LIGHT]);
-/** Besides where volumes show, and the light, which has a part of its own. */
+/** All parameters except those of volumes and those of the light, which are written separately. */
 const otherParameters = () => allParameters().filter((row) => !NAMED_APART.has(row));
 
 export type Shared = Readonly<{ actions: readonly Action[]; camera: CameraView | null }>;
 
-/** Returns a link's text on a channel's objects; "": the link has none. */
+/** Returns a link's text for a channel's objects; "" if the link needs none. */
 type WriteObjects = (channel: string, view: ObjectView) => string;
 
 /**
+ * Writes the link to a view. If it would be too long, shapes of transfer functions that do not show are left out.
+ *
  * @param start the state in which the bundle opens
- * @param look null: as the bundle opens
+ * @param camera null for the camera with which the bundle opens
  */
 export function writeLink(
   state: ViewerState,
@@ -67,7 +69,7 @@ export function writeLink(
   return links.find(({ length }) => length <= LONGEST) ?? links[links.length - 1];
 }
 
-/** Whether the shapes of a function are part of a link: where not all of them have room in one. */
+/** Returns whether the shapes of a function are part of a link, which may not have room for all shapes. */
 type HasShapes = (channel: ChannelState, name: string) => boolean;
 const isAnything: HasShapes = () => true;
 const isChosen: HasShapes = ({ transferFunction }, name) => name === transferFunction;
@@ -119,7 +121,7 @@ function linkOf(
     .join("&")}`;
 }
 
-/** Nothing, or the one entry of a channel that looks different. */
+/** Returns the entry of a channel with a changed appearance; an empty list for an unchanged channel. */
 function writeChannel(
   channel: ChannelState,
   start: ChannelState | undefined,
@@ -135,7 +137,7 @@ function writeChannel(
   for (const [name, shapes] of shaped) {
     parts.push(`s${encodeURIComponent(name)}_${writeShapes(shapes)}`);
   }
-  // shapes that are read choose their function
+  // Reading shapes also selects their function, so that the selected one has to be written after them.
   if (shaped.length > 0 || channel.transferFunction !== start?.transferFunction) {
     parts.push(`t${encodeURIComponent(channel.transferFunction)}`);
   }
@@ -143,10 +145,10 @@ function writeChannel(
 }
 
 /**
- * What brings a bundle that has just been opened to the view of a link.
+ * Reads a link: returns the actions and the camera that lead from a bundle's opening state to the view.
  *
  * @param hash of the page's address, with its `#`
- * @param specimen um, world: nothing is cut or measured beyond it
+ * @param specimen its bounds in um, world; cuts and points beyond them are moved to the bounds
  */
 export function readLink(hash: string, state: ViewerState, specimen: Box): Shared {
   const text = hash.replace(/^#/, "");
@@ -170,12 +172,12 @@ export function readLink(hash: string, state: ViewerState, specimen: Box): Share
   return new LinkReader(parts, state, specimen).read();
 }
 
-/** Of an address as it may be quoted in a notice. */
+/** Returns a text of an address, shortened for a notice. */
 function shortened(text: string): string {
   return text.length > 24 ? `${text.slice(0, 24)} …` : text;
 }
 
-/** null: no text at all, such as %ff. */
+/** Returns the decoded text; null if it can't be decoded, for example `%ff`. */
 function decoded(text: string): string | null {
   try {
     return decodeURIComponent(text);
@@ -235,7 +237,7 @@ class LinkReader {
     const text = this.parts.get("c");
     if (text === undefined) return;
     const named = text === "" ? [] : text.split(",").flatMap((id) => this.channel(id) ?? []);
-    if (text !== "" && named.length === 0) return; // none of them is here: better what opens
+    if (text !== "" && named.length === 0) return; // keeps the channels with which the bundle opens
     const wanted = new Set(named.slice(0, MAX_CHANNELS).map(({ id }) => id));
     const show = (shown: boolean) => {
       for (const each of this.state.channels) {
@@ -244,7 +246,7 @@ class LinkReader {
         }
       }
     };
-    show(false); // first, so that there is room
+    show(false); // hide channels first: the number of shown channels is limited
     show(true);
   }
 
@@ -272,7 +274,7 @@ class LinkReader {
     }
   }
 
-  /** The code that knows the table reads it on. */
+  /** Passes on the objects' text; the code that knows the table of objects parses it. */
   private readObjects(): void {
     const text = this.parts.get("objects");
     for (const entry of text ? text.split(",") : []) {
@@ -365,7 +367,7 @@ class LinkReader {
     else this.actions.push({ type: "keep-views", views });
   }
 
-  /** The nearest point of the specimen. */
+  /** Returns the nearest point within the specimen's bounds. */
   private within(point: readonly number[]): Vec3 {
     const { min, max } = this.specimen;
     const at = (i: 0 | 1 | 2) => Math.min(Math.max(point[i], min[i]), max[i]);

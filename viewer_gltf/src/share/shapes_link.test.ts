@@ -30,7 +30,7 @@ const after = (...actions: readonly Action[]) => actions.reduce(reduce, START);
 const read = (link: string) => readLink(link, START, SPECIMEN_BOX).actions;
 
 describe("shapes in a link", () => {
-  it("come back as they were, and so does the function that is chosen", () => {
+  it("are restored, together with the selected function", () => {
     const state = after(set("c0", "soft", [SHAPES[1]]), set("c0", OWN, SHAPES), {
       type: "choose-transfer-function",
       channel: "c0",
@@ -43,11 +43,11 @@ describe("shapes in a link", () => {
     expect(after(...read(writeLink(emptied, START, null))).channels).toEqual(emptied.channels);
   });
 
-  it("are left out of a link where nobody touched them", () => {
+  it("are left out of a link if they are unchanged", () => {
     expect(writeLink(START, START, null)).toBe("#v=1");
   });
 
-  it("give way where there are too many of them: those that don't show first", () => {
+  it("are left out if there are too many, beginning with those that do not show", () => {
     const many = Array.from({ length: MAX_SHAPES }, () => SHAPES[0]);
     const state = after(
       ...START.channels.flatMap(({ id }) => [set(id, "soft", many), set(id, OWN, many)]),
@@ -62,18 +62,18 @@ describe("shapes in a link", () => {
     expect(back.channels[5].shapes).toEqual({});
   });
 
-  it("that can't be read are reported, and change nothing", () => {
+  it("are reported and change nothing if they can't be read", () => {
     const good = writeShapes(SHAPES);
     for (const text of [
       ...[`c0:sown_${good}0`, `c0:sown_x${good.slice(1)}`, "c0:sown", `c0:snone_${good}`],
       ...[`c0:s%ff_${good}`, `c0:sown_${good.repeat(20)}`, `c0:sown_r${"zz".repeat(7)}000000`],
-      `c0:sown_${good.replace(/^t..../, "t8c5o")}`, // values that fall
+      `c0:sown_${good.replace(/^t..../, "t8c5o")}`, // the upper value is below the lower one
     ]) {
       const actions = read(`#v=1&l=${text}`);
       expect(actions.map(({ type }) => type)).toEqual(["notify"]);
     }
     expect(readShapes("")).toEqual([]);
     const [shown] = after(...read("#v=1&l=c0:town")).channels;
-    expect(shown.transferFunction).toBe("default"); // there is none of one's own
+    expect(shown.transferFunction).toBe("default"); // the user has no function of their own
   });
 });

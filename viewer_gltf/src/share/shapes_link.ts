@@ -1,7 +1,7 @@
 /**
- * Shapes of a two-dimensional transfer function in a link, 21 characters each: `r` or `t`; lower and
- * upper value, lower and upper gradient, tip, opacity and softness, two digits of base 36 each; the
- * colour, sRGB. Pure.
+ * Writes and reads the shapes of a two-dimensional transfer function in a link. Each has 21 characters: `r` or `t`;
+ * lower and upper value, lower and upper gradient, tip, opacity and softness as two digits of base 36 each; and the
+ * colour in sRGB. Pure.
  */
 
 import { MAX_SHAPES, type Shape, type Shapes } from "../bundle/transfer_2d";
@@ -23,7 +23,7 @@ export function writeShapes(shapes: Shapes): string {
     .join("");
 }
 
-/** null: they can't be read. */
+/** Reads shapes; null if they can't be read. */
 export function readShapes(text: string): Shapes | null {
   if (text.length % LENGTH !== 0 || text.length > MAX_SHAPES * LENGTH) return null;
   const shapes = Array.from({ length: text.length / LENGTH }, (_, i) =>

@@ -1,4 +1,4 @@
-/** Measurements with names that the viewer makes up, in place of those that a reader has typed. Pure. */
+/** Replaces names of measurements that a user has typed by ones that the viewer generates. Pure. */
 import { freeName, type Measurement, NAMES } from "../state/measurements";
 
 export function untypedNames(list: readonly Measurement[]): readonly Measurement[] {

@@ -1,4 +1,4 @@
-/** The page shows a source as the pipeline does: `stereocell view` and a build of the same files. */
+/** Compares a source that the page opens with `stereocell view` and a build of the same files. */
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -36,11 +36,11 @@ const SOURCES = [
   "sided.ome.zarr",
 ];
 
-/** Middle of the bright voxels (z, y, x), um from the first voxel of the finest level. */
+/** Centre of the bright voxels (z, y, x), um from the first voxel of the finest level. */
 function middleOf({ voxels, shape, first, step }: CoarseVolume, spacing_um: Triple): Triple {
   const sums = [0, 0, 0, 0];
   voxels.forEach((value, i) => {
-    if (value < 300) return; // the ground lies at 200 at most
+    if (value < 300) return; // the background has values of at most 200
     const place = [
       Math.floor(i / (shape[1] * shape[2])),
       Math.floor(i / shape[2]) % shape[1],
@@ -88,7 +88,7 @@ describe.skipIf(!hasPython)("a source in the page, compared with the pipeline", 
     return { volume, voxels: zstd.decode(texture.levels[0].levelData, x * y * z) };
   }
 
-  it.each(SOURCES)("%s has the place, the channels and the colours", (name) => {
+  it.each(SOURCES)("%s has the same place, channels and colours", (name) => {
     const { bundle, view } = shown(name);
     const { specimen, tiles, channels } = bundle.manifest;
     expect(specimen.name).toBe(view.specimen.name);
@@ -113,7 +113,7 @@ describe.skipIf(!hasPython)("a source in the page, compared with the pipeline", 
     });
   });
 
-  it.each(SOURCES)("%s has windows of a build, within 1 %% of a window", (name) => {
+  it.each(SOURCES)("%s has the windows of a build, within 1 %% of the window", (name) => {
     const { bundle, view } = shown(name);
     bundle.manifest.channels.forEach(({ window }, i) => {
       const { window: expected } = view.channels[i];
@@ -136,14 +136,14 @@ describe.skipIf(!hasPython)("a source in the page, compared with the pipeline", 
       for (const [row, each] of common.entries()) {
         const expected = evaluate(view.channels[i].functions[each]);
         const apart = expected.map((v, x) => Math.abs(v - texels[4 * (256 * row + x) + 3] / 255));
-        // where a function rises at once, a shift by a 256th of the window is a large difference
+        // The mean is compared: where a function has a step, a shift by 1/256 of the window changes single values a lot.
         const mean = apart.reduce((sum, v) => sum + v, 0) / 256;
         expect(mean, `${channel.id} ${each}`).toBeLessThan(0.01);
       }
     }
   });
 
-  it("shows an MR by the greys of a build", async () => {
+  it("shows an MR with the same greys as a build", async () => {
     const { bundle, view } = shown("head.nii.gz");
     const [channel] = bundle.manifest.channels;
     expect(channel.transfer_function).toBe("grey");
@@ -163,7 +163,7 @@ describe.skipIf(!hasPython)("a source in the page, compared with the pipeline", 
     });
   });
 
-  it.each(SOURCES)("%s has the voxels, in their places", async (name) => {
+  it.each(SOURCES)("%s has the same voxels at the same places", async (name) => {
     const { bundle, view } = shown(name);
     for (const [i, channel] of bundle.manifest.channels.entries()) {
       const { volume, voxels } = await volumeOf(name, channel);
@@ -178,11 +178,11 @@ describe.skipIf(!hasPython)("a source in the page, compared with the pipeline", 
       const theirs = Buffer.from(expected.voxels, "base64");
       expect(voxels.length).toBe(theirs.length);
       const apart = voxels.reduce((sum, v, at) => sum + Math.abs(v - theirs[at]), 0);
-      expect(apart / voxels.length).toBeLessThan(1.5); // of 255: windows differ by their sample
+      expect(apart / voxels.length).toBeLessThan(1.5); // grey levels of 255; windows differ a little
     }
   });
 
-  it.each(["v04.ome.zarr", "sided.ome.zarr"])("%s has one place at each level", async (name) => {
+  it.each(["v04.ome.zarr", "sided.ome.zarr"])("%s has one place at all levels", async (name) => {
     const source = await localSource(join(folder, name));
     if (source.kind !== "folder") throw new Error("expected a folder");
     const levels = [SHOWN_VOXELS, 20_000].map(async (most) => {

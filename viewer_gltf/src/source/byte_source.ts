@@ -1,6 +1,6 @@
-/** Bytes of files of a source, whole or in part: at a host, or dropped on the page. */
+/** Reads files of a source, whole or in part, from a host or from a file that was dropped on the page. */
 
-/** The part of a file: from an offset on, or its last bytes. */
+/** A part of a file: bytes from an offset, or the last bytes. */
 export type ByteRange =
   | Readonly<{ offset: number; length: number }>
   | Readonly<{ suffixLength: number }>;
@@ -11,13 +11,13 @@ export interface ByteSource {
   readonly name: string;
   size(): Promise<number>;
   read(offset: number, length: number): Promise<Uint8Array<ArrayBuffer>>;
-  /** All of it, as it comes. */
+  /** The whole file, piece by piece as it arrives. */
   stream(): Promise<ReadableStream<Uint8Array<ArrayBuffer>>>;
 }
 
 /** Files below a folder, as zarrita asks for them: a key begins with a slash. */
 export interface FileStore {
-  /** The reason why a host has let the page read no file so far; null: it has let it. */
+  /** The reason why the host has not let the page read any file so far; null if it has. */
   readonly refusal?: Error | null;
   get(key: string): Promise<Uint8Array<ArrayBuffer> | undefined>;
   getRange(key: string, range: ByteRange): Promise<Uint8Array<ArrayBuffer> | undefined>;
@@ -54,7 +54,7 @@ export function placeOf(
   return { offset: size - length, length };
 }
 
-/** A folder of this machine: each file is looked up when it is asked for, since there may be a million. */
+/** A folder of this machine. Each file is looked up only when it is read, since there may be a million. */
 export class LocalFolder implements FileStore {
   /** @param find the file at a path below the folder; null: there is none */
   constructor(private readonly find: (path: string) => Promise<File | null>) {}

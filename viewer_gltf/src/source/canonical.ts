@@ -1,17 +1,17 @@
 /**
- * The axes of a patient's volume turned to canonical ones: anterior, inferior, left. Voxels are flipped and permuted,
- * never resampled; a rotation near the identity remains in the placement.
+ * Turns the axes of a patient's volume to canonical ones: anterior, inferior, left. Voxels are flipped and permuted,
+ * never resampled. The remaining small rotation is part of the placement.
  *
  * Follows pipeline/stereocell/read/anatomical_axes.py. Points are in LPS (left, posterior, superior), mm. In the world +x
  * is the patient's left, +y superior and +z anterior.
  */
 import { type StoredVoxels, type Triple, triple } from "./coarse_volume";
 
-/** Columns of a matrix 3 x 4, LPS in mm: where the stored axes lead, and the centre of the first voxel. */
+/** Columns of a 3 x 4 matrix, LPS in mm: a step along each stored axis, and the centre of the first voxel. */
 export type Affine = Readonly<{ axes: readonly [Triple, Triple, Triple]; origin: Triple }>;
 
 export type Canonical = Readonly<{
-  /** The stored axis that becomes z, y, x. */
+  /** The stored axes that become z, y and x. */
   order: readonly [0 | 1 | 2, 0 | 1 | 2, 0 | 1 | 2];
   /** Whether z, y, x run backwards along the stored axis. */
   flips: readonly [boolean, boolean, boolean];
@@ -60,7 +60,7 @@ export function canonicalOf({ axes, origin }: Affine, shape: Triple): Canonical 
   const [z, y, x] = order.map((axis, i) => toWorld(times(units[axis], flips[i] ? -1 : 1)));
   const spacing = order.map((axis) => lengthOf(axes[axis]) * UM_PER_MM);
   const at = times(toWorld(first), UM_PER_MM);
-  const placement = [...x, 0, ...times(y, -1), 0, ...z, 0, ...at, 1]; // image rows run downwards
+  const placement = [...x, 0, ...times(y, -1), 0, ...z, 0, ...at, 1]; // y is negated, because image rows run downwards
   return {
     order,
     flips: [flips[0], flips[1], flips[2]],
@@ -69,7 +69,7 @@ export function canonicalOf({ axes, origin }: Affine, shape: Triple): Canonical 
   };
 }
 
-/** Stored voxels along canonical axes; none is moved. */
+/** Returns the same stored voxels with the order and strides of canonical axes; no data is copied. */
 export function turned(
   voxels: StoredVoxels,
   { order, flips }: Pick<Canonical, "order" | "flips">,

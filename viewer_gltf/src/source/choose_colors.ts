@@ -1,6 +1,6 @@
 /**
- * The colours of channels: as the source states them, else by the kind of volume, else those of a palette. No two
- * channels have nearly the same colour.
+ * Chooses the colours of channels: those that the source states, otherwise colours for the kind of volume, otherwise
+ * colours of a palette. No two channels get nearly the same colour.
  *
  * Follows `choose_colors` of pipeline/stereocell/planning/channel_colors.py. It does not look for
  * the names of dyes or of autofluorescence.
@@ -17,9 +17,9 @@ const MR_GREY: Rgb = [0.92, 0.88, 0.82];
 const WARM_GREY: Rgb = [0.62, 0.58, 0.52];
 /** Colour of a single channel of stained cells. */
 const STAIN = fromHex("#5cd6e8");
-/** Finest spacing up to which a volume of a microscope is taken for stained cells, um. */
+/** Largest voxel spacing, um, at which a microscope's volume is assumed to show stained cells. */
 const STAINED_UM = 10;
-/** A colour with no lighter part than this can't be seen on a dark ground. */
+/** Linear component, 0..1. A colour whose components are all below this can't be seen on a dark background. */
 const BLACK = 0.01;
 /** Distance in CIELab below which two colours are hard to tell apart. */
 const NEAR = 12;

@@ -1,17 +1,18 @@
 /**
- * A channel by the means of blocks of its voxels: no more than a page can hold, however large the source is.
+ * Reduces a channel to the means of blocks of its voxels, so that it fits into a page however large the source is.
  *
  * Follows pipeline/stereocell/live/coarse_channel.py, which reads blocks of a finer level where the source has one. The
- * page has to fetch all that it reads, so it takes one level as it is, and blocks only where the coarsest is too large.
+ * page has to fetch all voxels that it reads. It takes one level as it is, and blocks only if the coarsest level is too
+ * large.
  */
 import { SourceError } from "./source_error";
 
 /** Along z, y and x. */
 export type Triple = readonly [number, number, number];
 
-/** Most voxels of all channels together: 8 MB of textures, and at most as many voxels are read of a pyramid. */
+/** Largest number of shown voxels of all channels together; 8 MB of textures. */
 export const SHOWN_VOXELS = 8_000_000;
-/** Largest number of voxels that are read for each shown voxel, for a source without a pyramid. */
+/** Largest number of voxels that are read for each shown voxel, at the coarsest (or only) level of a source. */
 export const READ_FACTOR = 8;
 /** Approximate number of values on which a window is found. The pipeline takes 6 million. */
 const SAMPLED_VOXELS = 500_000;
@@ -36,7 +37,7 @@ export type CoarseVolume = Readonly<{
   first: Triple;
   /** Distance between voxels, in voxels of the finest level. */
   step: Triple;
-  /** Values as they were read, without means: the voxels that a histogram is made of. */
+  /** Values as they were read, before averaging; histograms are made from these. */
   sample: Float32Array<ArrayBuffer>;
 }>;
 
@@ -47,7 +48,7 @@ export const volumeOf = ([z, y, x]: Triple) => z * y * x;
 
 export const triple = (make: (axis: 0 | 1 | 2) => number): Triple => [make(0), make(1), make(2)];
 
-/** The voxels of a block, so that at most `most` blocks of about equal edges fill a shape. */
+/** Returns the edges of a block in voxels, about equal in length, such that at most `most` blocks fill the shape. */
 export function blockFor(shape: Triple, spacing: Triple, most: number): Triple {
   let edge = (shape.reduce((product, n, i) => product * n * spacing[i], 1) / most) ** (1 / 3);
   for (;;) {
@@ -73,7 +74,7 @@ export function makeCoarse(
   if (least === null) {
     throw new SourceError(`${where}: all voxels are NaN or infinite, expected an image.`);
   }
-  // as in the readers of the pipeline
+  // Values that are not finite become the smallest one, as in the readers of the pipeline.
   for (const values of [voxels, sample]) {
     for (let i = 0; i < values.length; i++) if (!Number.isFinite(values[i])) values[i] = least;
   }
@@ -113,7 +114,7 @@ function blockMeans({ data, ...stored }: StoredVoxels, block: Triple, shape: Tri
 function sampleOf({ data, shape, slope, intercept }: StoredVoxels): Float32Array<ArrayBuffer> {
   const count = Math.min(data.length, volumeOf(shape));
   let every = Math.ceil(count / SAMPLED_VOXELS);
-  if (every > 1 && every % 2 === 0) every++; // rows of an even length are not read in columns
+  if (every > 1 && every % 2 === 0) every++; // an odd step does not pick the same columns in each row of an even length
   const sample = new Float32Array(Math.ceil(count / every));
   for (let i = 0; i < sample.length; i++) sample[i] = slope * data[i * every] + intercept;
   return sample;
@@ -129,8 +130,8 @@ function leastOf(values: Float32Array): number | null {
 export type Places = Readonly<{ first: number; apart: number; count: number }>;
 
 /**
- * Places about `step` apart from the first voxel of the finest level to its last, and `apron` more beyond each end. The
- * box of the volume is that of a build, whatever the level.
+ * Returns places about `step` apart, from the first voxel of the finest level to the last one, and `apron` more beyond
+ * each end. The volume's box is thus the same as that of a build, whichever level is shown.
  */
 export function placesAlong(voxels: number, step: number, apron: number): Places {
   const last = voxels - 1;

@@ -19,12 +19,12 @@ describe("a window", () => {
     expect(findWindow(sorted([7, 7, 7]), [0.5, 99.95])).toEqual([7, 8]);
   });
 
-  it("counts what lies outside in its first and last bin", () => {
+  it("counts values outside it in the first and the last bin", () => {
     const counts = histogramOf(Float32Array.from([-5, 0, 255, 256, 999]), [0, 256]);
     expect([counts[0], counts[255]]).toEqual([2, 3]);
   });
 
-  it("is that of the kind of volume", () => {
+  it("depends on the kind of volume", () => {
     const ct = sorted([...new Array(50).fill(-1000), ...new Array(50).fill(40)]);
     const one = { isSigned: true, channels: [0] };
     const body = [
@@ -48,7 +48,7 @@ describe("colours", () => {
     expect(new Set([first, second, third].map(String)).size).toBe(3);
   });
 
-  it("of black, which can't be seen, are chosen", () => {
+  it("replace a stated black, which can't be seen", () => {
     expect(Math.max(...chooseColors([[0, 0, 0]], "", 0.5)[0])).toBeGreaterThan(0.1);
   });
 });
@@ -82,7 +82,7 @@ describe("a coarse volume", () => {
     expect(blockFor([10, 10, 10], [1, 1, 1], 1e6)).toEqual([1, 1, 1]);
   });
 
-  it("reads values that are no number as the smallest one", () => {
+  it("replaces values that are not numbers by the smallest value", () => {
     const data = Float32Array.from([Number.NaN, 5, Number.POSITIVE_INFINITY, 7, 9, 9, 9, 9]);
     const { voxels } = makeCoarse(
       { ...stored, data, shape: [2, 2, 2], strides: [4, 2, 1] },
@@ -101,7 +101,7 @@ describe("a coarse volume", () => {
     expect(places).toEqual({ first: -1.5, apart: 1.5, count: 5 }); // -1.5, 0, 1.5, 3, 4.5
     const made = resample(coarse, [places, places, places]);
     expect(made.length).toBe(125);
-    // at 1.5 half-way between the centres 0.5 and 2.5 along each axis
+    // Place 1.5 lies half-way between the centres 0.5 and 2.5 along each axis.
     const mean = coarse.voxels.reduce((sum, v) => sum + v, 0) / 8;
     expect(made[2 * 25 + 2 * 5 + 2]).toBeCloseTo(mean, 4);
     expect(made[0]).toBe(coarse.voxels[0]);
@@ -120,7 +120,7 @@ describe("the files of a volume", () => {
     expect(Math.abs(total(levels[1].data) - total(data))).toBeLessThan(1);
   });
 
-  it("have the range of each brick and of one more on each side", () => {
+  it("have the range of each brick, including one texel more on each side", () => {
     const data = new Uint8Array(20);
     data[8] = 200; // first of the second brick
     const { size, data: ranges } = minMaxBricks({ size: [20, 1, 1], data });

@@ -1,5 +1,5 @@
 /**
- * The window of a channel: the values that become 0 and 255, and the counts of voxels between them.
+ * Finds the window of a channel (the values that become 0 and 255), and counts the voxels within it.
  *
  * Follows `find_statistics` of pipeline/stereocell/transfer/channel_statistics.py with the percentiles of the presets. Two
  * things differ: values are sampled more sparsely (see coarse_volume.ts), and a head holder is not left out.
@@ -16,16 +16,16 @@ const OF_MR: Percentiles = [1, 99.8]; // presets/mri.toml
 /** Hounsfield units: presets/ct.toml. */
 const OF_CT: Window = [-1024, 2000];
 
-/** Finest spacings above the first, up to the second, um, are those of light sheets: see preset_choice.py. */
+/** Voxel spacings of light-sheet volumes, um: above the first number, up to the second. See preset_choice.py. */
 const OVERVIEW_UM = [1, 10];
-/** Smallest finest spacing of a scan of a body, um; microscopes have finer ones. */
+/** Smallest voxel spacing of a scan of a body, um; microscopes have smaller ones. */
 const BODY_UM = 100;
 /** Smallest voxel spacing of a patient's MR, um. */
 const PATIENT_UM = 300;
 /** Smallest extent of a patient, um. */
 const PART_UM = 20_000;
 
-/** The kind of a volume: a term of DICOM, empty where a microscope took it; and how its window is found. */
+/** The kind of a volume: its DICOM modality (empty for a microscope), and its window or how to find it. */
 export type Kind = Readonly<{ modality: "" | "CT" | "MR"; window: Window | Percentiles }>;
 
 /** At least AIR_SHARE of a CT's voxels lie within AIR_SPREAD of air, HU, and 99 % lie below metal. */
@@ -59,7 +59,7 @@ function hasAir(sorted: Float32Array): boolean {
   return air >= AIR_SHARE * sorted.length && percentile(sorted, 99) <= MAX_HU;
 }
 
-/** A percentile of sorted values, linear between neighbours, as NumPy has it. */
+/** Returns a percentile of sorted values, linear between neighbours like NumPy's default. */
 export function percentile(sorted: Float32Array, percent: number): number {
   const at = (percent / 100) * (sorted.length - 1);
   const low = Math.floor(at);
@@ -67,14 +67,14 @@ export function percentile(sorted: Float32Array, percent: number): number {
   return sorted[low] + (at - low) * (sorted[high] - sorted[low]);
 }
 
-/** The window by percentiles. That of a constant channel is 1 wide. */
+/** Returns the window between two percentiles. The window of a constant channel is 1 wide. */
 export function findWindow(sorted: Float32Array, [low, high]: Percentiles): Window {
   const found = [percentile(sorted, low), percentile(sorted, high)] as const;
   if (found[1] > found[0]) return found;
-  // sparse channels: fewer bright voxels than the percentile leaves out
+  // The percentiles coincide in a sparse channel, whose bright voxels are fewer than the percentile leaves out.
   const ends = [sorted[0], sorted[sorted.length - 1]] as const;
   if (ends[1] > ends[0]) return ends;
-  return [ends[0], ends[0] + Math.max(1, 1e-6 * Math.abs(ends[0]))]; // more than float32 tells apart
+  return [ends[0], ends[0] + Math.max(1, 1e-6 * Math.abs(ends[0]))]; // wider than the step between two float32 numbers
 }
 
 /** Voxel counts in BINS equal bins of the window; values outside count in the first or the last. */
@@ -88,7 +88,7 @@ export function histogramOf(values: Float32Array, [low, high]: Window): Float64A
   return counts;
 }
 
-/** The window of a kind: one of Hounsfield units is the same for all; others are found by percentiles. */
+/** Returns the window for a kind of volume: a fixed one for CT, otherwise one found by percentiles. */
 export function windowOf({ modality, window }: Kind, sorted: Float32Array): Window {
   return modality === "CT" ? window : findWindow(sorted, window);
 }

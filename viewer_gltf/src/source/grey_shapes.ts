@@ -1,7 +1,7 @@
 /**
  * The grey values of an MR on its cut faces, as a slice shows them: a two-dimensional function of bands of values.
  *
- * Follows pipeline/stereocell/transfer/mr_grey.py, where the reasons stand, and takes the numbers from there.
+ * Follows pipeline/stereocell/transfer/mr_grey.py, which explains the method and defines the numbers.
  */
 import {
   BANDS,
@@ -20,9 +20,9 @@ import type { OpacityPoints } from "./opacity";
 export const GREY = "grey";
 
 /**
- * @param level where the body begins, 0..1 in the window
+ * @param level at which the specimen begins, 0..1 in the window
  * @param opacity of the general function
- * @param gradientMax share of the window that a step is where its gradient is 1
+ * @param gradientMax size of a step whose gradient counts as 1, as a share of the window
  */
 export function greyShapes(
   level: number,
@@ -50,7 +50,7 @@ export function greyShapes(
   }).flat();
 }
 
-/** The value from which on tissue has the channel's own colour, 0..1 in the window. */
+/** Returns the value from which tissue has the channel's full colour, 0..1 in the window. */
 function brightestOf(level: number, histogram: Float64Array): number {
   const within = histogram.subarray(Math.floor(level * BINS));
   const total = within.reduce((sum, n) => sum + n, 0);

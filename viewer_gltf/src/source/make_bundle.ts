@@ -1,8 +1,8 @@
 /**
- * Makes a bundle of an opened image: the manifest, volumes, transfer functions and histograms that a build writes, by the
- * same schema, held by the page. So a source is shown by all that shows a bundle.
+ * Makes a bundle of an opened image: the manifest, volumes, transfer functions and histograms that a build writes, by
+ * the same schema. The page holds these files, and shows a source by the same code as a bundle.
  *
- * Follows pipeline/stereocell/live/first_view.py. The bundle has one tile, and volumes alone.
+ * Follows pipeline/stereocell/live/first_view.py. The bundle has one tile, and no surfaces.
  */
 import type { Channel, FileRef, Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
@@ -29,7 +29,7 @@ const TILE = "r0_c0";
 const GRADIENT_MAX = 0.5;
 /** The level of the skin, Hounsfield units: presets/ct.toml. */
 const SKIN_HU = -300;
-/** As `PATIENT_SIDES` of usd/opening.py. */
+/** Directions of a patient's sides; the same as `PATIENT_SIDES` of usd/opening.py. */
 const SIDES = { left: [1, 0, 0], posterior: [0, 0, -1], superior: [0, 1, 0] } as const;
 const NO_SURFACE = "surfaces are made by a build: stereocell build";
 
@@ -137,14 +137,14 @@ async function describeChannel(
     ...{ gradient_max: GRADIENT_MAX, functions: shapes, most },
     histogram: await put(files, `channels/${id}/histogram2d.ktx2`, picture.file),
   };
-  // the row of a two-dimensional function stands for it where gradients are not known
+  // Where gradients are not known, a row of intensities replaces the two-dimensional function.
   const rows = new Map([
     ...functions,
     ...Object.keys(shapes).map((key) => [key, opacity] as const),
   ]);
   const table = writeKtx2([256, rows.size, 1], 4, [bake([...rows.values()])]);
   const [firstName, ...otherNames] = rows.keys();
-  // as `make_appearance` of the pipeline: within a body of a microscope's volume others show
+  // The same choice as `make_appearance` of the pipeline: "soft" lets other channels show within an object.
   const opening = isGrey ? GREY : modality === "" && level !== null ? "soft" : "default";
   return {
     ...{ id, name, opens, color: [...color], window: [...window] },
@@ -190,7 +190,7 @@ async function writeVolume(
     const n = size[axis] - 1 - 2 * APRON;
     return (bounds.max[axis] - bounds.min[axis]) / Math.max(1, n);
   });
-  // a single plane is no distance thick
+  // An axis with a single plane has a step of 0; it gets the smallest step of the others, at most 1 um.
   const finest = Math.min(...apart.filter((step) => step > 0), 1);
   const [sx, sy, sz] = apart.map((step) => step || finest);
   const described = levels.map(async (level, i) => {
@@ -223,7 +223,7 @@ async function writeVolume(
   };
 }
 
-/** A row of 256 texels RGBA for each function: white, of its opacity. */
+/** Returns a row of 256 RGBA texels for each function: white, with the function's opacity. */
 function bake(functions: readonly OpacityPoints[]): Uint8Array {
   const table = new Uint8Array(functions.length * 256 * 4).fill(255);
   functions.forEach((points, row) => {
@@ -249,7 +249,7 @@ function moved(
   return { min: [low[0], low[1], low[2]], max: [high[0], high[1], high[2]] };
 }
 
-/** A name as part of a path, as model/identifiers.py makes it, so that a link to a view fits the build as well. */
+/** Returns a name for use in a path, by the rules of model/identifiers.py: a link to a view then fits a build, too. */
 export function identifierOf(name: string): string {
   return [...name]
     .map((char, i, all) => {
@@ -261,7 +261,7 @@ export function identifierOf(name: string): string {
 }
 
 async function hashOf(bytes: Uint8Array<ArrayBuffer>): Promise<string> {
-  // elsewhere no hash is checked, for there is nothing to check it with: see bundle/hash.ts
+  // Without a secure context the browser can't compute hashes, and none is checked: see bundle/hash.ts.
   if (!globalThis.isSecureContext) return "0".repeat(64);
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
   return Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");

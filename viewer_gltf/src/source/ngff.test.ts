@@ -14,7 +14,7 @@ const image = (more: object = {}, steps: object[] = [scale(1, 200, 100, 100)]) =
 });
 
 describe("the metadata of OME-Zarr", () => {
-  it("are those of 0.4, or in `ome` those of 0.5", () => {
+  it("are read in the form of 0.4, and below `ome` in the form of 0.5", () => {
     const found = parseNgff(image({ version: "0.4" }), "x");
     expect(found.axes).toEqual(["c", "z", "y", "x"]);
     expect(found.levels).toEqual([{ path: "0", scale_um: [0.2, 0.1, 0.1], shift_um: null }]);
@@ -32,7 +32,7 @@ describe("the metadata of OME-Zarr", () => {
     expect(levels[0].shift_um).toEqual([5, 10, 15]);
   });
 
-  it("of older versions have names alone, and a spacing is assumed", () => {
+  it("have only names of axes in older versions, and a spacing is assumed", () => {
     const old = {
       multiscales: [{ version: "0.3", axes: ["t", "c", "z", "y", "x"], datasets: [{ path: "0" }] }],
     };
@@ -45,7 +45,7 @@ describe("the metadata of OME-Zarr", () => {
     expect(parseNgff(older, "x").axes).toEqual(["t", "c", "z", "y", "x"]);
   });
 
-  it("state channels as far as they are well formed", () => {
+  it("keep the well-formed fields of channels", () => {
     const channels = [
       {
         label: " DAPI ",
@@ -101,7 +101,7 @@ describe("the metadata of OME-Zarr", () => {
     ]);
   });
 
-  it("state the sides of a body by three directions, or not at all", () => {
+  it("give the sides of a body only if three directions are stated", () => {
     expect(
       directionsOf(["inferior-to-superior", "posterior-to-anterior", "right-to-left"]),
     ).toEqual([

@@ -1,5 +1,5 @@
 /**
- * The metadata of an OME-Zarr image: axes, levels and channels. Pure.
+ * Reads the metadata of an OME-Zarr image: axes, levels and channels. Pure.
  *
  * Versions 0.4 and 0.5 are read, and older ones, which state no spacing. Follows
  * pipeline/stereocell/read/formats/ome_zarr/ngff.py.
@@ -16,7 +16,7 @@ const SPATIAL = ["z", "y", "x"] as const;
 /** One level of the pyramid. */
 export type NgffLevel = Readonly<{
   path: string;
-  /** Distance and first centre of the voxels (z, y, x), um; null: not stated. */
+  /** Distance between voxels (z, y, x), um, and centre of the first one; null if not stated. */
   scale_um: Triple | null;
   shift_um: Triple | null;
 }>;
@@ -34,7 +34,7 @@ export type NgffImage = Readonly<{
   axes: readonly string[];
   /** Finest first. */
   levels: readonly NgffLevel[];
-  /** As many as the metadata describe: fewer than the image may have. */
+  /** The channels that the metadata describe; the image may have more. */
   channels: readonly NgffChannel[];
   /** Directions in which the indices of z, y and x grow, as `left-to-right`; empty: not stated. */
   orientations: readonly [string, string, string];
@@ -61,7 +61,7 @@ const UM: Readonly<Record<string, number>> = {
   m: 1e6,
 };
 
-/** A unit of length in um; null: there is none, or it is no length. */
+/** Returns the size of a unit of length in um; null if it is missing, or is not a unit of length. */
 export function umPer(unit: unknown): number | null {
   if (typeof unit !== "string") return null;
   const name = unit.trim().toLowerCase().replace("metre", "meter");
@@ -125,7 +125,7 @@ function otherKind(ome: Table): string {
 }
 
 function axesOf(image: Table, where: string): { axes: readonly Table[]; names: readonly string[] } {
-  // versions 0.1 and 0.2 do not name the axes, and 0.3 only names them
+  // Versions 0.1 and 0.2 do not list the axes, and 0.3 lists only their names.
   const stated = image.axes === undefined ? ["t", "c", ...SPATIAL] : listOf(image.axes);
   const axes = stated.map((axis) => (typeof axis === "string" ? { name: axis } : tableOf(axis)));
   const names = axes.map(({ name }) => String(name).toLowerCase());
@@ -179,7 +179,7 @@ function levelOf(dataset: Table, image: Table, axes: readonly Table[], where: st
   return { path, scale_um, shift_um: lengths(shift, axes) };
 }
 
-/** Lengths (z, y, x), um; null where one is not stated, has no unit or is no length. */
+/** Returns lengths (z, y, x), um; null if one is missing, has no unit or has a unit that is not a length. */
 function lengths(values: readonly number[] | null, axes: readonly Table[]): Triple | null {
   if (values === null) return null;
   const found = SPATIAL.map((name) => {
@@ -222,7 +222,8 @@ const SIDES: Readonly<Record<string, readonly [0 | 1 | 2, 1 | -1]>> = {
 };
 
 /**
- * The directions of the stored axes (z, y, x) in LPS, unit vectors; null: they are not stated, or do not part the body.
+ * Returns the directions of the stored axes (z, y, x) as unit vectors in LPS; null if they are not stated, or are not
+ * three different axes of the body.
  */
 export function directionsOf(orientations: readonly string[]): readonly Triple[] | null {
   const found = orientations.map((text) => {

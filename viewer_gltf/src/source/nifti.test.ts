@@ -102,7 +102,7 @@ describe("a header of NIfTI", () => {
     expect([found.hasSides, found.notes]).toEqual([true, []]);
   });
 
-  it("has its place by sform, else by qform, else by pixdim alone", () => {
+  it("takes its place from sform, otherwise from qform, otherwise from pixdim alone", () => {
     // a quarter turn about z: quatern_d = sin(45 degrees)
     const qform = { quatern: [0, 0, Math.SQRT1_2], offset: [1, 2, 3] };
     const turned = parseNifti(header({ qform }), "x");
@@ -151,7 +151,7 @@ describe("a header of NIfTI", () => {
     expect(affine.axes[0][0]).toBeCloseTo(-2 * mm, 9);
   });
 
-  it("scales no values where the slope is 0 or no number", () => {
+  it("leaves values unscaled if the slope is 0 or not a number", () => {
     for (const slope of [0, Number.NaN]) {
       const found = parseNifti(header({ slope, intercept: 100 }), "x");
       expect([found.slope, found.intercept]).toEqual([1, 0]);
@@ -172,7 +172,7 @@ describe("a header of NIfTI", () => {
     expect(() => parseNifti(header(options), "head.nii")).toThrow(text);
   });
 
-  it("is refused where it is cut short, or no file of NIfTI", () => {
+  it("is refused if it is cut short, or is not from a NIfTI file", () => {
     for (const bytes of [new Uint8Array(0), header().slice(0, 200), new Uint8Array(600)]) {
       expect(() => parseNifti(bytes, "head.nii")).toThrow("head.nii: found no header of NIfTI");
     }
@@ -197,17 +197,17 @@ describe("a file of NIfTI", () => {
     expect([...coarse.voxels]).toEqual(stored.map((v) => 0.5 * v + 1));
   });
 
-  it("may be packed", async () => {
+  it("may be gzipped", async () => {
     const packed = file({ sform: SFORM }, (bytes) => new Uint8Array(gzipSync(bytes)));
     expect((await read(packed)).coarse.voxels.length).toBe(12);
   });
 
-  it("shows the first point in time, and says so", async () => {
+  it("shows the first time point, and notes that", async () => {
     const { image } = await read(file({ sform: SFORM, dim: [4, 3, 2, 1, 2, 1, 1, 1] }));
     expect(image.notes).toEqual(["Only the first of 2 time points is shown."]);
   });
 
-  it("is refused where it is cut short, or damaged", async () => {
+  it("is refused if it is cut short or damaged", async () => {
     const whole = file({ sform: SFORM });
     await expect(read(new File([whole.slice(0, 370)], "head.nii"))).rejects.toThrow(
       "head.nii: found 18 bytes of voxels, expected 24: the file is cut short.",
@@ -221,7 +221,7 @@ describe("a file of NIfTI", () => {
 });
 
 describe("canonical axes", () => {
-  it("keep a grid that runs to anterior, inferior and left as it is", () => {
+  it("leave a grid that runs to anterior, inferior and left unchanged", () => {
     const { order, flips, placement } = canonicalOf(
       {
         axes: [

@@ -1,8 +1,8 @@
 /**
- * The header of NIfTI-1 and NIfTI-2: type, shape and place of the voxels. Pure.
+ * Reads the header of NIfTI-1 and NIfTI-2: type, shape and place of the voxels. Pure.
  *
- * The order of trust is that of pipeline/stereocell/read/formats/nifti/statements.py and of most programs: sform, else
- * qform, else pixdim alone. Texts in the header may identify a patient and are not read.
+ * The place is that of sform, otherwise of qform, otherwise of pixdim alone, as in most programs and in
+ * pipeline/stereocell/read/formats/nifti/statements.py. Texts in the header may identify a patient and are not read.
  *
  * References: NIfTI-1 Data Format, https://nifti.nimh.nih.gov/nifti-1/
  */
@@ -32,7 +32,7 @@ const TYPES: Readonly<Record<number, VoxelType>> = {
 const BYTES: Readonly<Record<VoxelType, number>> = {
   ...{ uint8: 1, int8: 1, int16: 2, uint16: 2, int32: 4, uint32: 4, float32: 4, float64: 8 },
 };
-/** Types that hold no single number, by their code. */
+/** Types that are not supported, by their code. */
 const OTHERS: Readonly<Record<number, string>> = {
   ...{ 1: "bits", 32: "complex numbers", 128: "colours", 1024: "whole numbers of 64 bits" },
   ...{ 1280: "whole numbers of 64 bits", 1536: "numbers of 128 bits" },
@@ -69,9 +69,9 @@ const FIELDS = {
   },
 } as const;
 
-/** Least volume of the parallelepiped of three unit axes; below, they lie in a plane. */
+/** Smallest volume of the parallelepiped of three unit axes; with less, the axes nearly lie in a plane. */
 const MIN_VOLUME = 0.1;
-/** Cosine between two axes; a smaller one is rounding. */
+/** Largest cosine between two axes that is due to rounding. */
 const SKEW = 1e-3;
 const MM: Readonly<Record<number, number>> = { 1: 1000, 2: 1, 3: 0.001 };
 
@@ -179,7 +179,7 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   };
 }
 
-/** Rows of RAS to columns. */
+/** Turns the three rows of an RAS matrix into the columns of an affine. */
 function sformOf(rows: readonly number[]): Affine {
   const column = (i: number): Triple => [rows[i], rows[4 + i], rows[8 + i]];
   return { axes: [column(0), column(1), column(2)], origin: column(3) };
@@ -192,7 +192,7 @@ function qformOf(
   [sx, sy, sz]: Triple,
 ): Affine {
   const rest = 1 - (b * b + c * c + d * d);
-  // rounding may leave a little less than nothing
+  // Rounding may make the difference slightly negative.
   const a = rest > -1e-5 ? Math.sqrt(Math.max(0, rest)) : Number.NaN;
   return {
     axes: [

@@ -1,10 +1,10 @@
 /**
- * Transfer functions from intensity to opacity.
+ * Makes transfer functions from intensity to opacity.
  *
- * Follows `make_transfer_functions` of pipeline/stereocell/transfer/opacity.py, where the reasons stand, and takes
- * the numbers from there. Only the level differs: a build uses the level of a surface, and this page uses that of
- * find_level.ts, or the level of the skin for a CT. There
- * are no functions at the adaptive threshold, by tissue of a CT, or of two dimensions but for that of grey_shapes.ts.
+ * Follows `make_transfer_functions` of pipeline/stereocell/transfer/opacity.py, which explains the method and defines
+ * the numbers. The level differs: a build uses the level of a surface, and this page uses the level of find_level.ts,
+ * or the level of the skin for a CT. The page makes no functions at the adaptive threshold or for the tissues of a CT,
+ * and no two-dimensional ones except those of grey_shapes.ts.
  */
 import {
   AT_SURFACE,
@@ -27,23 +27,23 @@ import { BINS } from "./find_window";
 /** Intensity and opacity, 0..1 each. */
 export type OpacityPoints = readonly (readonly [number, number])[];
 
-/** Percent of the voxels that are fainter than the volume of a channel without a level shows. */
+/** Percent of the voxels that are too faint to show in a channel without a level. */
 const LEVEL_PERCENTILE = 99;
 
 export type FunctionOptions = Readonly<{
-  /** Level at which the body begins, 0..1 in the window; null: none is known. */
+  /** Level at which the specimen begins, 0..1 in the window; null if unknown. */
   level: number | null;
-  /** A term of DICOM; empty: of a microscope. */
+  /** The DICOM modality; empty for a microscope. */
   modality: "" | "CT" | "MR";
   /** Shortest edge of the volume, in finest voxel spacings. */
   depth_voxels: number;
 }>;
 
-/** The intensities at which opacity starts, is that of the level, and is that of a bright body. */
+/** Intensities at which opacity leaves 0, reaches its value at a surface, and reaches its value in a bright object. */
 type Rise = Readonly<{ floor: number; top: number; bright: number }>;
 
 /**
- * The opacity points of each function, by name.
+ * Returns the opacity points of each function, by name.
  *
  * @param histogram voxel counts over 0..1 in BINS equal bins
  */
@@ -91,7 +91,7 @@ function riseOf(
   const share = isNoisy ? BRIGHT_OF_MAGNITUDES : BRIGHT;
   const bright = Math.max(level + share * (1 - level), level + 0.02);
   if (isNoisy) {
-    // Noise of magnitudes would be dust in front of a surface: opacity starts where it ends.
+    // Noise of an MR's magnitudes would look like dust in front of a surface. Opacity starts where the noise ends.
     const below = smoothed(histogram.subarray(0, Math.floor(level * BINS)));
     floor = Math.max(floor, Math.min(endOfNoise(below) / BINS, FOOT * level));
     const beyond = level + noiseBeyond(below) / BINS;
@@ -100,7 +100,7 @@ function riseOf(
   return { floor, top: Math.max(level, floor / FOOT), bright };
 }
 
-/** The bin at which the noise of the background ends; 0: there is no peak of a background. */
+/** Returns the bin at which the noise of the background ends; 0 if the background has no peak. */
 function endOfNoise(below: Float64Array): number {
   const mode = below.indexOf(Math.max(0, ...below));
   if (mode === -1 || below[mode] === 0) return 0;
@@ -108,7 +108,7 @@ function endOfNoise(below: Float64Array): number {
   return half === -1 ? 0 : mode + NOISE_REACH * half;
 }
 
-/** By how many bins noise goes on beyond the level; 0: the counts there are few, or even. */
+/** Returns by how many bins noise extends beyond the level; 0 if the counts there are few or do not fall. */
 function noiseBeyond(below: Float64Array): number {
   const last = below.length - 1;
   const before = Math.floor(0.75 * last);
@@ -120,7 +120,7 @@ function noiseBeyond(below: Float64Array): number {
   return (Math.log(below[last] / (FAINT * peak)) * (last - before)) / fall;
 }
 
-/** A Gaussian of 2 bins over counts, whose ends continue: as `gaussian_filter1d` of SciPy. */
+/** Smooths counts by a Gaussian of 2 bins, like SciPy's `gaussian_filter1d` in mode `nearest`. */
 function smoothed(counts: Float64Array): Float64Array {
   const [sigma, reach] = [2, 8];
   const weights = Array.from({ length: 2 * reach + 1 }, (_, i) =>
@@ -137,7 +137,7 @@ function smoothed(counts: Float64Array): Float64Array {
   });
 }
 
-/** The upper end of the first bin below which a share of the voxels lies, 0..1. */
+/** Returns the intensity, 0..1, below which a share of the voxels lies: the upper end of a bin. */
 function quantile(histogram: Float64Array, share: number): number {
   const total = Math.max(1, sumOf(histogram));
   let below = 0;
@@ -150,7 +150,7 @@ function quantile(histogram: Float64Array, share: number): number {
 
 const sumOf = (counts: Float64Array) => counts.reduce((sum, n) => sum + n, 0);
 
-/** The points with opacities so low that the mean optical depth of the volume is SOFT_DEPTH. */
+/** Returns the points with opacities that are reduced until the volume's mean optical depth is about SOFT_DEPTH. */
 function thinned(
   soft: OpacityPoints,
   histogram: Float64Array,
@@ -164,7 +164,7 @@ function thinned(
   return pointsOf(...soft.slice(1).map(([x, opacity]) => [x, 1 - (1 - opacity) ** share] as const));
 }
 
-/** Opacity at BINS intensities from 0 to 1, linear between the points. */
+/** Returns the opacity at BINS intensities from 0 to 1, linear between the points. */
 export function evaluate(points: OpacityPoints): Float32Array {
   const table = new Float32Array(BINS);
   let segment = 0;
@@ -178,7 +178,7 @@ export function evaluate(points: OpacityPoints): Float32Array {
   return table;
 }
 
-/** The origin and the points, rounded as those of a build. */
+/** Returns the origin and the given points, rounded like those of a build. */
 function pointsOf(...inner: (readonly [number, number])[]): OpacityPoints {
   const round = (value: number) => Math.round(value * 1e4) / 1e4;
   return [[0, 0], ...inner.map(([x, opacity]) => [round(x), round(opacity)] as const)];

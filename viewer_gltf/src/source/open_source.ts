@@ -1,4 +1,4 @@
-/** Opens a source in the page, without a server: the entry of this folder, which is loaded when a source is to be shown. */
+/** Opens a source in the page, without a server. This is the entry of the folder; it loads when a source is opened. */
 import type { Bundle } from "../bundle/load";
 import { type ByteSource, LocalFile, LocalFolder } from "./byte_source";
 import { makeBundle } from "./make_bundle";
@@ -10,7 +10,7 @@ import { SourceError } from "./source_error";
 import { isNothingFound } from "./zarr_faults";
 import { ZipStore } from "./zip_store";
 
-/** A source as the viewer shows it, and sentences that appear as notices do. */
+/** A source as a bundle, and sentences that the viewer shows as notices. */
 export type ShownSource = Readonly<{ bundle: Bundle; notes: readonly string[] }>;
 
 const NIFTI = /\.nii(\.gz)?$/i;
@@ -32,18 +32,18 @@ export async function openAddress(address: string, report: Report): Promise<Show
   } catch (error) {
     if (!isNothingFound(error)) throw error;
     if (FILE.test(path) && !path.endsWith(".zarr")) throw otherFormat(name, url.href);
-    // with the whole address: one that was given without https:// is below that of the page
+    // Shows the whole address: one without https:// was resolved relative to the page, which its user did not intend.
     const { message } = error as SourceError;
     throw new SourceError(message.replace(`${name}:`, `${url.href}:`));
   }
 }
 
-/** A file or a folder of this machine, as a person has dropped or chosen it. */
+/** A file or a folder of this machine that the user has dropped or chosen. */
 export type LocalSource =
   | Readonly<{ kind: "file"; file: File }>
   | Readonly<{ kind: "folder"; name: string; find: (path: string) => Promise<File | null> }>;
 
-/** Opens a file or a folder of this machine, of which nothing leaves it. Throws SourceError. */
+/** Opens a file or a folder of this machine. Its data never leave the machine. Throws SourceError. */
 export async function openLocal(source: LocalSource, report: Report): Promise<ShownSource> {
   if (source.kind === "file")
     return shown(await openFile(new LocalFile(source.file), report), report);

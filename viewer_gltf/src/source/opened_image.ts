@@ -9,13 +9,13 @@ export type ImageChannel = Readonly<{
   color: Rgb | null;
   /** Values that the source states as the ends of the window; null: it states none. */
   window: Window | null;
-  /** Whether the channel shows at the opening. */
+  /** Whether the channel is shown when the source opens. */
   opens: boolean;
-  /** Reads the voxels, and calls back with the share of them that has come, 0..1. Throws SourceError. */
+  /** Reads the voxels, and reports the share of them that has arrived, 0..1. Throws SourceError. */
   read: (onShare?: (share: number) => void) => Promise<CoarseVolume>;
 }>;
 
-/** A source that was opened: its metadata, and the way to its voxels. */
+/** An opened source: its metadata, and the functions that read its voxels. */
 export type OpenedImage = Readonly<{
   name: string;
   /** Voxels of the finest level (z, y, x), and their distance in um. */

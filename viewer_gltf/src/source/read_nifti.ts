@@ -1,4 +1,4 @@
-/** Opens a NIfTI file, `.nii` or `.nii.gz`. The first point in time is read, and of a packed file nothing behind it. */
+/** Opens a NIfTI file, `.nii` or `.nii.gz`. Reading stops after the first time point. */
 import type { ByteSource } from "./byte_source";
 import { canonicalOf, turned } from "./canonical";
 import { blockFor, makeCoarse, SHOWN_VOXELS, triple, volumeOf } from "./coarse_volume";
@@ -59,7 +59,7 @@ export async function openNifti(file: ByteSource, report: Report): Promise<Opene
   };
 }
 
-/** The bytes of the voxels at the first point in time. */
+/** The header, and the bytes of the voxels at the first time point. */
 type FirstVolume = Readonly<{ header: NiftiHeader; voxels: Uint8Array<ArrayBuffer> }>;
 
 /** Throws SourceError. */

@@ -1,5 +1,6 @@
 /**
- * Opens an OME-Zarr image by zarrita: Zarr v2 and v3, sharded or not, at a host, in a zip archive or in a dropped folder.
+ * Opens an OME-Zarr image with zarrita: Zarr v2 and v3, sharded or not, on a host, in a zip archive or in a dropped
+ * folder.
  */
 import * as zarr from "zarrita";
 import type { FileStore } from "./byte_source";
@@ -28,12 +29,12 @@ import {
   spatial,
 } from "./zarr_levels";
 
-/** Requests at a time; a browser opens six connections to a host. */
+/** Largest number of simultaneous requests; a browser opens six connections to a host with HTTP/1.1. */
 const AT_ONCE = 8;
 
 /**
- * @param name the name of the source, for people
- * @param most voxels of all channels together that are shown, at most
+ * @param name the name of the source that users see
+ * @param most largest number of voxels of all channels together
  */
 export async function openZarr(
   files: FileStore,
@@ -101,7 +102,7 @@ function gridOf(image: NgffImage, level: number, finest: Level, array: Level): G
   return { shape, spacing_um, levelShape, place };
 }
 
-/** The turn to canonical axes, where the image states the sides of a body; null: it states none. */
+/** Returns the canonical axes if the image states the sides of a body; otherwise null. */
 function canonicalOfImage(image: NgffImage, { shape, spacing_um }: Grid): Canonical | null {
   const ways = directionsOf(image.orientations);
   if (ways === null) return null;
@@ -124,7 +125,7 @@ function turnedGrid(grid: Grid, { order, flips, spacing_um }: Canonical): Grid {
   return { shape, spacing_um, levelShape, place };
 }
 
-/** The store, with the number of chunks that were found and of those that were missing. */
+/** Returns the store, which from then on counts the chunks that were found and those that were missing. */
 function counted(files: FileStore, counts: { found: number; missing: number }): Store {
   const count = (key: string, bytes: Uint8Array | undefined) => {
     const isMetadata = /(^|\/)(zarr\.json|\.z(array|attrs|group|metadata))$/.test(key);
@@ -170,7 +171,7 @@ function notesOn(
   return notes;
 }
 
-/** The voxels (z, y, x) of a channel, at the first point in time. */
+/** Reads the voxels (z, y, x) of a channel at the first time point. */
 async function readLevel(
   array: Level,
   axes: readonly string[],
@@ -194,7 +195,7 @@ async function readLevel(
   };
 }
 
-/** Runs jobs, so many at a time; none is started once one has failed. */
+/** Runs at most `limit` jobs at a time, and starts none after one has failed. */
 class Queue {
   private readonly jobs: (() => Promise<void>)[] = [];
   private added = 0;

@@ -1,9 +1,9 @@
 /**
- * Files of a source at a host. A page may read another host's files only if that host allows it, so each refusal says
- * whose turn it is: the reader's, or that of whoever runs the host.
+ * Reads files of a source from a host. A page may read another host's files only if that host allows it. Each error
+ * names the person who can solve it: the user, or the operator of the host.
  *
- * Requests carry no cookie and no Referer. Parts are asked for by their first and last byte, which needs no leave of the
- * host beforehand (a "preflight" of CORS); a number of last bytes would.
+ * Requests carry no cookie and no Referer. Parts are requested by their first and last byte, which needs no CORS
+ * preflight; a request for the last bytes of a file would need one.
  */
 import { TemporaryError } from "../bundle/errors";
 import { withRetries } from "../bundle/retry";
@@ -11,18 +11,18 @@ import { type ByteRange, type ByteSource, type FileStore, placeOf } from "./byte
 import { SourceError } from "./source_error";
 
 const OPTIONS: RequestInit = { credentials: "omit", referrerPolicy: "no-referrer" };
-/** HTTP status of an answer to a range. */
+/** HTTP status of a response with a part of a file. */
 const PART = 206;
-/** Answers of a host that has no such file. Buckets that list nothing answer 403 for those. */
+/** HTTP statuses for a missing file. Buckets that do not allow listing answer 403. */
 const NO_FILE = [403, 404];
-/** Answers that may be better a moment later. */
+/** HTTP statuses of faults that may pass: this one, and all from the next one up. */
 const BUSY = 429;
 const FIRST_SERVER_FAULT = 500;
 
-/** The host lets no other page read an answer: of a file, or where there is none. */
+/** The host does not let this page read a response, which may also be the response for a missing file. */
 class RefusedError extends SourceError {}
 
-/** The response; null where there is no such file. Throws SourceError, or TemporaryError after some tries. */
+/** Returns the response; null if there is no such file. Throws SourceError, or TemporaryError after some retries. */
 async function ask(url: URL, options: RequestInit = {}): Promise<Response | null> {
   return withRetries(async () => {
     let response: Response;
@@ -77,7 +77,7 @@ async function bodyOf(response: Response, url: URL): Promise<Uint8Array<ArrayBuf
   }
 }
 
-/** A part of the file at an address; null where there is no such file. */
+/** Returns a part of the file at an address; null if there is no such file. */
 async function partOf(
   url: URL,
   { offset, length }: Readonly<{ offset: number; length: number }>,
@@ -100,7 +100,7 @@ async function partOf(
   );
 }
 
-/** The size of the file at an address; null where there is no such file. */
+/** Returns the size of the file at an address; null if there is no such file. */
 async function sizeOf(url: URL): Promise<number | null> {
   const response = await ask(url, { method: "HEAD" });
   if (response === null) return null;
@@ -149,10 +149,10 @@ export class RemoteFile implements ByteSource {
 }
 
 /**
- * The files below a folder's address. Its query, such as a token, goes with each.
+ * The files below a folder's address. The address's query, such as a token, is part of each request.
  *
- * Many hosts let pages read their files, but not the answer that there is none. So a refusal stands for a missing file;
- * where no file at all could be read, it is the fault.
+ * Many hosts let pages read their files, but not the response for a missing file. A refusal thus counts as a missing
+ * file. Only if no file could be read at all is the refusal reported.
  */
 export class RemoteFolder implements FileStore {
   refusal: SourceError | null = null;

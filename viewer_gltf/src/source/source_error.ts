@@ -1,6 +1,6 @@
 import { BundleError } from "../bundle/errors";
 
-/** A source that can't be shown. The message is one sentence that names who has to do what. */
+/** A source can't be shown. The message is a sentence that names the remedy. */
 export class SourceError extends BundleError {
   override readonly name = "SourceError";
 }

@@ -4,7 +4,7 @@ import { ZSTDDecoder } from "zstddec";
 import { storeZstd, writeKtx2 } from "./texture_file";
 
 describe("a texture", () => {
-  it.each([1, 2, 4] as const)("of %i components is read by others", async (channels) => {
+  it.each([1, 2, 4] as const)("is readable by ktx-parse with %i components", async (channels) => {
     const zstd = new ZSTDDecoder();
     await zstd.init();
     const sizes =
@@ -50,7 +50,7 @@ describe("a texture", () => {
     expect(found.keyValue.KTXwriter).toBe("StereoCell");
   });
 
-  it("has frames of several blocks", async () => {
+  it("may have zstd frames of several blocks", async () => {
     const zstd = new ZSTDDecoder();
     await zstd.init();
     const data = Uint8Array.from({ length: 300_000 }, (_, i) => i * 7);

@@ -1,6 +1,7 @@
 /**
- * KTX2 textures with a zstd frame for each level, as pipeline/stereocell/formats/ktx2.py writes them; but no frame is
- * compressed. The writer of ktx-parse would come into the page's first file, whose reader of KTX2 is in the same module.
+ * Writes KTX2 textures with a zstd frame for each level, like pipeline/stereocell/formats/ktx2.py but without
+ * compression. The writer of ktx-parse is not used: it is in one module with its reader, and would thus be part of the
+ * first file that the page loads.
  *
  * References: KTX 2.0 specification, Khronos, revision 2.0.4
  */
@@ -19,10 +20,10 @@ const SCHEME_ZSTD = 2;
 const DESCRIPTOR_VERSION = 2;
 const WRITER = "KTXwriter\0StereoCell\0";
 
-/** Bytes of a zstd block, at most. */
+/** Largest zstd block, bytes. */
 const MAX_BLOCK = 128 * 1024;
 
-/** A zstd frame of raw blocks (RFC 8878, 3.1.1): stored, not compressed, since no browser has an encoder. */
+/** Returns a zstd frame of raw blocks (RFC 8878, 3.1.1), not compressed, since browsers have no encoder. */
 export function storeZstd(data: Uint8Array): Uint8Array<ArrayBuffer> {
   const blocks = Math.max(1, Math.ceil(data.length / MAX_BLOCK));
   const frame = new Uint8Array(9 + 3 * blocks + data.length);

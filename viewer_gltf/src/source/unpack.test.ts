@@ -1,4 +1,4 @@
-/** Chunks are unpacked as numcodecs has packed them. */
+/** Chunks that numcodecs has packed are unpacked to the same bytes. */
 import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -28,7 +28,7 @@ describe.skipIf(!hasPython)("a packed chunk", () => {
     await rm(folder, { recursive: true });
   }, 60_000);
 
-  it("is unpacked, by each codec, shuffle and size of value", async () => {
+  it("is unpacked for each codec, shuffle and size of value", async () => {
     expect(chunks.length).toBeGreaterThan(150);
     for (const { name, codec, packed, plain } of chunks) {
       const found = await CODECS[codec].fromConfig().decode(bytesOf(packed));
@@ -36,7 +36,7 @@ describe.skipIf(!hasPython)("a packed chunk", () => {
     }
   });
 
-  it("that is damaged is refused, or unpacked to as many bytes", async () => {
+  it("that is damaged is refused, or unpacked to the same number of bytes", async () => {
     let refused = 0;
     for (const [i, { codec, packed, plain }] of chunks.entries()) {
       if (codec === "zstd" || !(i % 3 === 0)) continue;
@@ -57,8 +57,8 @@ describe.skipIf(!hasPython)("a packed chunk", () => {
 });
 
 describe("a stream", () => {
-  it("of LZ4 may repeat what it has just written", () => {
-    // one literal, then 11 bytes from 1 back; then the last literals
+  it("may repeat bytes that it has just written, in LZ4", () => {
+    // one literal, then 11 bytes copied from 1 byte back, then the last literals
     expect(String.fromCharCode(...unpackLz4(Uint8Array.of(0x17, 97, 1, 0, 0x10, 98), 13))).toBe(
       "aaaaaaaaaaaab",
     );

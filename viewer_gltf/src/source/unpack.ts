@@ -2,11 +2,11 @@
 
 const damaged = (kind: string) => new RangeError(`the ${kind} stream is broken`);
 
-/** A block of LZ4, by https://github.com/lz4/lz4/blob/dev/doc/lz4_Block_format.md. */
+/** Unpacks a block of LZ4, by https://github.com/lz4/lz4/blob/dev/doc/lz4_Block_format.md. */
 export function unpackLz4(packed: Uint8Array, bytes: number): Uint8Array {
   const out = new Uint8Array(bytes);
   let [from, to] = [0, 0];
-  /** A length whose first part is in a token: bytes of 255 go on. */
+  /** Reads a length that begins in a token; each following byte of 255 means that another byte follows. */
   const lengthOf = (first: number) => {
     let length = first;
     for (let code = first === 15 ? 255 : 0; code === 255; ) {
@@ -34,10 +34,10 @@ export function unpackLz4(packed: Uint8Array, bytes: number): Uint8Array {
   return out;
 }
 
-/** Distance from which on BloscLZ writes it by two bytes more. */
+/** Largest distance that BloscLZ encodes without two additional bytes. */
 const FAR = 8191;
 
-/** A stream of BloscLZ, as `blosclz_decompress` of c-blosc 1.21 reads it. */
+/** Unpacks a stream of BloscLZ in the same way as `blosclz_decompress` of c-blosc 1.21. */
 export function unpackBloscLz(packed: Uint8Array, bytes: number): Uint8Array {
   const out = new Uint8Array(bytes);
   let [from, to] = [0, 0];

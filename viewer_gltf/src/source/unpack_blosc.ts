@@ -1,8 +1,8 @@
 /**
  * Unpacks Blosc 1, in which most OME-Zarr 0.4 is written.
  *
- * The package numcodecs has c-blosc as WebAssembly, with its compressor (600 kB); and its glue makes functions of text,
- * which the page's policy forbids.
+ * The package numcodecs is not used. It contains c-blosc as WebAssembly together with the compressor (600 kB), and its
+ * glue code makes functions from text, which the page's security policy forbids.
  *
  * References: https://github.com/Blosc/c-blosc/blob/main/README_CHUNK_FORMAT.rst
  */
@@ -13,7 +13,7 @@ import { partsOf } from "./zip_store";
 const HEADER_BYTES = 16;
 /** Flags of the header. */
 const [SHUFFLED, COPIED, BIT_SHUFFLED, UNSPLIT] = [1, 2, 4, 16];
-/** A block is split into a stream for each byte of a value up to so many bytes, and if each has so many values. */
+/** Blocks have a stream for each byte of a value if values have at most 16 bytes, and blocks at least 128 values. */
 const [MAX_SPLITS, MIN_SPLIT] = [16, 128];
 /** Largest chunk that is unpacked. */
 const MAX_BYTES = 1 << 30;
@@ -22,7 +22,7 @@ const zstd = new ZSTDDecoder();
 
 type Unpack = (packed: Uint8Array<ArrayBuffer>, bytes: number) => Uint8Array | Promise<Uint8Array>;
 
-/** By the number that the header has for each codec. */
+/** The codecs by their number in the header. */
 const CODECS: Readonly<Record<number, Unpack>> = {
   0: unpackBloscLz,
   1: unpackLz4,
@@ -33,7 +33,7 @@ const CODECS: Readonly<Record<number, Unpack>> = {
   },
 };
 
-/** Throws RangeError where the chunk is damaged, or packed by an unknown codec. */
+/** Unpacks a chunk. Throws RangeError if it is damaged, or packed by an unknown codec. */
 export async function unpackBlosc(given: Uint8Array): Promise<Uint8Array> {
   const packed = given as Uint8Array<ArrayBuffer>;
   const view = new DataView(packed.buffer, packed.byteOffset, packed.byteLength);
@@ -82,7 +82,7 @@ function unshuffled(values: Uint8Array, typeSize: number, flags: number): Uint8A
   return (flags & BIT_SHUFFLED) !== 0 ? unshuffleBits(values, typeSize) : values;
 }
 
-/** The first bytes of all values lie side by side, then the second ones. */
+/** Reverses a byte shuffle, which stores the first bytes of all values side by side, then the second bytes. */
 function unshuffleBytes(values: Uint8Array, typeSize: number): Uint8Array {
   const count = Math.floor(values.length / typeSize);
   const out = values.slice(); // the remaining bytes at the end are not shuffled
@@ -93,7 +93,7 @@ function unshuffleBytes(values: Uint8Array, typeSize: number): Uint8Array {
   return out;
 }
 
-/** The first bits of all values lie side by side, then the second ones. */
+/** Reverses a bit shuffle, which stores the first bits of all values side by side, then the second bits. */
 function unshuffleBits(values: Uint8Array, typeSize: number): Uint8Array {
   const count = Math.floor(values.length / typeSize);
   if (count % 8 !== 0) return values; // such blocks are not shuffled
@@ -117,7 +117,7 @@ async function unpackZlib(packed: Uint8Array<ArrayBuffer>, bytes: number): Promi
   let at = 0;
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   for await (const part of partsOf(stream)) {
-    out.set(part, at); // throws where there is more than the block has room for
+    out.set(part, at); // throws if the streams contain more than fits into the block
     at += part.length;
   }
   return out;

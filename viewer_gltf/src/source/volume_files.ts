@@ -1,5 +1,5 @@
 /**
- * The data of a volume's files: mip levels, the value range of each brick, and counts by value and gradient.
+ * Makes the data of a volume's files: mip levels, the value range of each brick, and counts by value and gradient.
  *
  * Follows pipeline/stereocell/filters/min_max_bricks.py and transfer/joint_histogram.py.
  */
@@ -11,12 +11,12 @@ import { brickCounts } from "../voxels/skip_bricks";
 /** 8-bit texels, x fastest. */
 export type Texels = Readonly<{ size: Size3; data: Uint8Array }>;
 
-/** Texels along the longest axis of the last mip level, at most. */
+/** Largest number of texels along the longest axis of the last mip level. */
 const SMALLEST_LEVEL = 4;
-/** Most voxels whose gradients are counted; of a larger volume every so many planes are. */
+/** Approximate number of voxels whose gradients are counted; in a larger volume, planes are skipped at regular steps. */
 const COUNTED_VOXELS = 4_000_000;
 
-/** Values as 8-bit texels: the ends of the window are 0 and 255. */
+/** Returns values as 8-bit texels; the ends of the window become 0 and 255. */
 export function toTexels(values: Float32Array, [low, high]: readonly [number, number]): Uint8Array {
   const scale = 255 / (high - low);
   const texels = new Uint8Array(values.length);
@@ -26,7 +26,7 @@ export function toTexels(values: Float32Array, [low, high]: readonly [number, nu
   return texels;
 }
 
-/** The volume and its coarser levels, finest first. Means are kept between levels, and rounded at each. */
+/** Returns the volume and its coarser levels, finest first. Each level is made from unrounded means, then rounded. */
 export function mipLevels(volume: Texels): readonly Texels[] {
   const levels = [volume];
   let means = new Float32Array(volume.data);
@@ -47,7 +47,7 @@ function rounded(values: Float32Array): Uint8Array {
   return texels;
 }
 
-/** Half as many along an axis: a coarser voxel is the mean of those that it covers, by the share that it covers. */
+/** Halves the voxels along an axis. A coarser voxel is the mean of those it covers, weighted by the covered share. */
 function halve(
   values: Float32Array<ArrayBuffer>,
   size: Size3,
@@ -75,7 +75,7 @@ function halve(
   return made;
 }
 
-/** Smallest and largest texel of each brick and of one more on each side, interleaved. */
+/** Returns the smallest and largest texel of each brick, interleaved. One texel more on each side counts, too. */
 export function minMaxBricks({ size, data }: Texels): Texels {
   let [low, high] = [data, data];
   let shape = size;
@@ -122,10 +122,10 @@ function reduceBricks(
 }
 
 /**
- * Voxels by value and gradient magnitude: ROWS x COLUMNS, row 0 is gradient 0. The outermost voxels, an apron, are
- * counted only as neighbours.
+ * Counts voxels by value and gradient magnitude: ROWS x COLUMNS, row 0 is gradient 0. The outermost voxels, an apron,
+ * are used for gradients and not counted.
  *
- * @param spacing x, y, z; only its ratios count
+ * @param spacing x, y, z; only its ratios matter
  */
 export function countJoint(
   { size, data }: Texels,
@@ -154,7 +154,7 @@ export function countJoint(
   return counts;
 }
 
-/** Counts as a picture on a logarithmic scale: 0 where there is none, 255 where there are most. */
+/** Returns counts on a logarithmic scale: 0 for no voxels, 255 for the largest count, `most`. */
 export function logScaled(counts: Float64Array, most: number): Uint8Array {
   const scale = most === 0 ? 0 : 255 / Math.log1p(most);
   return Uint8Array.from(counts, (n) =>

@@ -9,13 +9,13 @@ const channel = (more: Partial<NgffChannel> = {}): NgffChannel => ({
 const read = () => Promise.reject(new Error("not read here"));
 
 describe("the channels of an image", () => {
-  it("are all read up to eight, those first that are active", () => {
+  it("are read up to eight, and active ones are preferred", () => {
     expect(chooseChannels([], 3)).toEqual([0, 1, 2]);
     const stated = Array.from({ length: 12 }, (_, i) => channel({ active: i > 5 }));
     expect(chooseChannels(stated, 12)).toEqual([0, 1, 6, 7, 8, 9, 10, 11]);
   });
 
-  it("open as stated, and all of them where none is active", () => {
+  it("open as stated, or all together if none is active", () => {
     const stated = [channel({ active: false }), channel({ active: true }), channel()];
     const opens = (some: readonly NgffChannel[]) =>
       channelsOf(some, [...some.keys()], "uint16", read).map((one) => one.opens);
@@ -23,7 +23,7 @@ describe("the channels of an image", () => {
     expect(opens([channel({ active: false }), channel({ active: false })])).toEqual([true, true]);
   });
 
-  it("have a stated window, unless it is all that the type can hold", () => {
+  it("have the stated window, unless it is the whole range of the number type", () => {
     const windowOf = (window: [number, number], dtype: string) =>
       channelsOf([channel({ window })], [0], dtype, read)[0].window;
     expect(windowOf([100, 1500], "uint16")).toEqual([100, 1500]);
@@ -32,7 +32,7 @@ describe("the channels of an image", () => {
     expect(windowOf([0, 1], "float32")).toEqual([0, 1]);
   });
 
-  it("have names of their own", () => {
+  it("have unique names", () => {
     const stated = ["CD3", "cd3", "DAPI"].map((label) => channel({ label }));
     const names = channelsOf(stated, [0, 1, 2, 3], "uint8", read).map(({ name }) => name);
     expect(names).toEqual(["CD3 (channel 0)", "cd3 (channel 1)", "DAPI", "Channel3"]);

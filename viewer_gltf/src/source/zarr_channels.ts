@@ -1,12 +1,12 @@
-/** The channels of an OME-Zarr image: which ones are read, and what the metadata state of them. */
+/** Chooses the channels of an OME-Zarr image that are read, and collects their metadata. */
 import type { CoarseVolume } from "./coarse_volume";
 import type { NgffChannel } from "./ngff";
 import type { ImageChannel } from "./opened_image";
 
-/** Most channels that are read. */
+/** Largest number of channels that are read. */
 const MAX_CHANNELS = 8;
 
-/** The places of the channels that are shown, in their order in the source: those that are active come first. */
+/** Returns the indices of the channels to show, in the order of the source. Active channels are preferred. */
 export function chooseChannels(stated: readonly NgffChannel[], total: number): readonly number[] {
   const all = Array.from({ length: total }, (_, i) => i);
   const isActive = (i: number) => stated[i]?.active !== false;
@@ -32,7 +32,7 @@ export function channelsOf(
   }));
 }
 
-/** A stated window, unless it is all that the type can hold, which some writers state for none. */
+/** Returns a stated window; null if it is the whole range of the type, which some writers state in place of none. */
 function usefulWindow(window: NgffChannel["window"], dtype: string): NgffChannel["window"] {
   const bits = Number(/^u?int(\d+)$/.exec(dtype)?.[1] ?? 0);
   const isWhole = window !== null && bits > 8 && window[1] - window[0] >= 2 ** bits - 1;
@@ -42,7 +42,7 @@ function usefulWindow(window: NgffChannel["window"], dtype: string): NgffChannel
 /** Longest name of a channel, characters. */
 const LONGEST_NAME = 60;
 
-/** Equal names get their place, as those of a build do. */
+/** Makes names unique: equal names get the number of their place, as in a build. */
 function unique(stated: readonly string[]): readonly string[] {
   const names = stated.map((name) => name.slice(0, LONGEST_NAME));
   const counts = new Map<string, number>();

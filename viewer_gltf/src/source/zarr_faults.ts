@@ -14,7 +14,7 @@ export async function explained<T>(where: string, job: () => Promise<T>): Promis
   }
 }
 
-/** Returns whether an error means that there is no Zarr at an address. */
+/** Returns whether an error means that there are no Zarr metadata at an address. */
 export function isNothingFound(error: unknown): boolean {
   return error instanceof SourceError && zarr.isZarritaError(error.cause, "NotFoundError");
 }

@@ -1,11 +1,11 @@
-/** The levels of an OME-Zarr image: which one is shown, and where its voxels lie. */
+/** Chooses the level of an OME-Zarr image to show, and finds where its voxels lie. */
 import * as zarr from "zarrita";
 import { type LevelPlace, READ_FACTOR, type Triple, triple, volumeOf } from "./coarse_volume";
 import type { NgffImage } from "./ngff";
 import { SourceError } from "./source_error";
 import { explained } from "./zarr_faults";
 
-/** Most bytes of a chunk once it is unpacked. */
+/** Largest chunk, bytes, unpacked. */
 const MAX_CHUNK_BYTES = 1 << 28;
 const NUMBERS = /^(u?int(8|16|32|64)|float(32|64))$/;
 
@@ -45,9 +45,10 @@ export async function openLevel(
 }
 
 /**
- * The finest level that is small enough; the coarsest is shown by the means of blocks where none is.
+ * Returns the finest level that is small enough; if none is, the coarsest, which is then reduced to means of blocks.
+ * Throws SourceError if the coarsest has more than READ_FACTOR times as many voxels.
  *
- * @param most voxels of a channel that are shown, at most
+ * @param most largest number of voxels of a channel
  */
 export async function chooseLevel(
   store: Store,
@@ -76,7 +77,7 @@ export async function chooseLevel(
 export const spatial = (axes: readonly string[], values: readonly number[]): Triple =>
   triple((i) => values[axes.indexOf("zyx"[i])]);
 
-/** Where a level's voxels lie: by the stated scales, or by its shape where there are none. */
+/** Returns where a level's voxels lie: by the stated scales, or by the level's shape if no scales are stated. */
 export function placeOfLevel(
   { levels }: NgffImage,
   level: number,
@@ -89,7 +90,7 @@ export function placeOfLevel(
     const byShape = shape[i] / levelShape[i];
     if (own.scale_um === null) return byShape;
     const stated = own.scale_um[i] / scale[i];
-    // all levels cover one field: a level whose scale says otherwise is placed by its shape
+    // All levels cover the same field. If a level's scale contradicts this, its shape decides.
     return Math.abs(shape[i] / stated - levelShape[i]) <= 1 + 1e-6 ? stated : byShape;
   });
   const [to, from] = [own.shift_um, levels[0].shift_um];

@@ -11,7 +11,7 @@ type Member = Readonly<{
   unpacked?: number;
 }>;
 
-/** An archive by PKWARE's note; `isWide`: with the records of 64 bits. */
+/** Writes an archive by PKWARE's APPNOTE; `isWide` adds the records for 64-bit numbers. */
 function archive(members: readonly Member[], isWide = false, comment = ""): File {
   const parts: Uint8Array[] = [];
   const list: Uint8Array[] = [];
@@ -24,7 +24,7 @@ function archive(members: readonly Member[], isWide = false, comment = ""): File
     const local = new DataView(new ArrayBuffer(30));
     local.setUint32(0, 0x04034b50, true);
     local.setUint16(26, title.length, true);
-    local.setUint16(28, 9, true); // more than the list has
+    local.setUint16(28, 9, true); // longer than in the list of members
     parts.push(new Uint8Array(local.buffer), title, new Uint8Array(9), content);
     const entry = new DataView(new ArrayBuffer(46));
     entry.setUint32(0, 0x02014b50, true);
@@ -93,7 +93,7 @@ describe("a zip archive of OME-Zarr", () => {
     },
   );
 
-  it("may have the group in its only folder", async () => {
+  it("may contain the group in its only folder", async () => {
     const store = await open(
       archive([
         { name: "a.zarr/.zgroup", text: "1" },
@@ -120,7 +120,7 @@ describe("a zip archive of OME-Zarr", () => {
     await expect(open(file)).rejects.toThrow(text);
   });
 
-  it("is refused where its list is damaged", async () => {
+  it("is refused if its list of members is damaged", async () => {
     const bytes = new Uint8Array(await archive([GROUP, { name: "0/0", text: "x" }]).arrayBuffer());
     const at = bytes.length - 22 - 46 - 3;
     for (const [place, value] of [
@@ -134,7 +134,7 @@ describe("a zip archive of OME-Zarr", () => {
     }
   });
 
-  it("is refused where a member unpacks to another size than the list says, or by an unknown method", async () => {
+  it("is refused if a member has another size than listed, or an unknown compression method", async () => {
     for (const unpacked of [3, 300]) {
       const store = await open(
         archive([GROUP, { name: "0", text: "packed", method: 8, unpacked }]),

@@ -1,6 +1,6 @@
 /**
- * The files of a zip archive, read by parts: OME-Zarr in one file (`.ozx` of RFC-9, `.zarr.zip`). Members are stored, or
- * packed by deflate. The group lies at the root of the archive, or in its only folder.
+ * Reads the files of a zip archive part by part: OME-Zarr in one file (`.ozx` of RFC-9, `.zarr.zip`). Members are stored
+ * or deflated. The group lies at the root of the archive, or in its only folder.
  *
  * References: PKWARE APPNOTE 6.3; https://ngff.openmicroscopy.org/rfc/9
  */
@@ -12,17 +12,17 @@ const END_64_LOCATOR = 0x07064b50;
 const END_64 = 0x06064b50;
 const ENTRY = 0x02014b50;
 const LOCAL = 0x04034b50;
-/** Bytes of an end record, of a locator before it, and of the longest comment behind it. */
+/** Bytes of the end record, of the locator before it, and of the longest comment after it. */
 const [END_BYTES, LOCATOR_BYTES, COMMENT_BYTES] = [22, 20, 0xffff];
 const ENTRY_BYTES = 46;
 const LOCAL_BYTES = 30;
-/** The extra field that holds numbers of 64 bits. */
+/** Identifier of the extra field that holds 64-bit numbers. */
 const EXTRA_64 = 1;
-/** In place of a number that only the extra field holds. */
+/** Placeholder for a number that only the extra field holds. */
 const WIDE = 0xffffffff;
-/** Largest list of members that is read: of about a million. */
+/** Largest list of members that is read, bytes; enough for about a million members. */
 const MAX_LIST_BYTES = 1 << 27;
-/** Largest member that is unpacked. */
+/** Largest member that is unpacked, bytes. */
 const MAX_UNPACKED_BYTES = 1 << 29;
 /** Methods: stored, deflate. */
 const [STORED, DEFLATED] = [0, 8];
@@ -33,12 +33,12 @@ type Member = Readonly<{
   unpacked: number;
   /** First byte of the local header. */
   header: number;
-  /** Likely bytes of the local header: that of the list may have other extra fields. */
+  /** Estimated size of the local header, bytes; its extra fields may differ from those in the list. */
   headerBytes: number;
 }>;
 
 export class ZipStore implements FileStore {
-  /** First byte of the contents of members that were read in part. */
+  /** Offset of the contents of each member that was read in part. */
   private readonly starts = new Map<string, number>();
 
   private constructor(
@@ -47,7 +47,7 @@ export class ZipStore implements FileStore {
     private readonly root: string,
   ) {}
 
-  /** Throws SourceError where it is no zip archive of a Zarr group. */
+  /** Opens an archive. Throws SourceError if it is not a zip archive with a Zarr group. */
   static async open(archive: ByteSource): Promise<ZipStore> {
     const { offset, bytes, count } = await readList(archive);
     const members = parseList(bytes, count, archive.name, offset);
@@ -96,7 +96,7 @@ export class ZipStore implements FileStore {
     return this.archive.read(start + offset, length);
   }
 
-  /** First byte of the contents, counted from the local header at the start of the bytes. */
+  /** Returns the offset of the contents, counted from the local header at the start of the bytes. */
   private startIn(bytes: Uint8Array, name: string): number {
     const view = viewOf(bytes);
     if (bytes.length < LOCAL_BYTES || view.getUint32(0, true) !== LOCAL) {
@@ -127,7 +127,7 @@ export class ZipStore implements FileStore {
         .stream()
         .pipeThrough(new DecompressionStream("deflate-raw"));
       for await (const part of partsOf(stream)) {
-        made.set(part, at); // throws where there is more than the list says
+        made.set(part, at); // throws if the member is longer than listed
         at += part.length;
       }
     } catch (error) {
@@ -138,7 +138,7 @@ export class ZipStore implements FileStore {
   }
 }
 
-/** The parts of a stream; Safari's streams are no iterables. */
+/** Yields the parts of a stream; Safari's streams can't be iterated. */
 export async function* partsOf(
   stream: ReadableStream<Uint8Array<ArrayBuffer>>,
 ): AsyncGenerator<Uint8Array<ArrayBuffer>> {
@@ -157,7 +157,7 @@ export async function* partsOf(
 const viewOf = (bytes: Uint8Array) =>
   new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
 
-/** The list of members at the end of the archive. */
+/** Reads the list of members at the end of the archive. */
 async function readList(archive: ByteSource) {
   const wrong = new SourceError(
     `${archive.name}: found no zip archive that is whole, expected OME-Zarr in one file.`,
@@ -248,7 +248,7 @@ function parseList(
   return members;
 }
 
-/** The folder of the group within the archive, empty or with a closing slash; null: there is none. */
+/** Returns the folder of the group in the archive, empty or with a closing slash; null if there is none. */
 function rootOf(names: readonly string[]): string | null {
   const isGroup = (root: string) =>
     ["zarr.json", ".zattrs", ".zgroup"].some((name) => names.includes(root + name));

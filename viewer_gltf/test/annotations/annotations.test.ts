@@ -1,4 +1,4 @@
-/** Marks on the specimen, in a page of their own: lengths, angles, drags and names. */
+/** Marks on the specimen, in a page that shows only them: lengths, angles, drags and names. */
 import { readFile } from "node:fs/promises";
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
@@ -11,7 +11,7 @@ import { describeInChromium } from "../support/browser/skip";
 
 const WIDTH = 720;
 const HEIGHT = 480;
-/** Where screenshots go, if anybody wants to look. */
+/** Folder for screenshots, if set. */
 const PICTURES = process.env.MARKS_PICTURES;
 
 describeInChromium("marks", () => {
@@ -24,7 +24,7 @@ describeInChromium("marks", () => {
     const built = await bundled(new URL("../support/annotations/harness.ts", import.meta.url));
     script = built.replaceAll("{}.url", "location.href"); // a classic script has no import.meta
     page = await browser.context.newPage();
-    // a page with an address: a worker's address is relative to it
+    // The page has an address, since a worker's address is relative to it.
     await page.route("http://marks.test/", (route) =>
       route.fulfill({
         contentType: "text/html",
@@ -77,7 +77,7 @@ describeInChromium("marks", () => {
       window.bench?.dispatch({ type: "set-clip", clip: { box, plane } });
     });
 
-  it("have a scale bar that is true within a pixel at any zoom and from any side", async () => {
+  it("have a scale bar that is correct within a pixel at any zoom and from any side", async () => {
     const said = new Set<string>();
     for (const [position, target] of [
       [
@@ -123,23 +123,23 @@ describeInChromium("marks", () => {
     await shoot("measure");
   });
 
-  it("measure from surface to surface by what is tapped", async () => {
+  it("measure from surface to surface where the user taps", async () => {
     await look([0, 0, 1.6]);
     const tap = async (point: Vec3) => {
       const { x, y } = await project(point);
       return page.evaluate(([px, py]) => window.bench?.measureAt(px, py), [x, y] as const);
     };
-    await tap([250, -200, 190]); // the balls' poles
+    await tap([250, -200, 190]); // the poles of the balls
     const measured = await tap([750, -200, 190]);
     expect(measured).toHaveLength(2);
     [250, -200, 190, 750, -200, 190].forEach((v, i) => {
-      expect(Math.abs((measured?.flat()[i] ?? 0) - v)).toBeLessThan(0.5); // balls of flat faces
+      expect(Math.abs((measured?.flat()[i] ?? 0) - v)).toBeLessThan(0.5); // the balls consist of flat faces
     });
-    expect(await tap([250, -200, 190])).toHaveLength(1); // begins anew
+    expect(await tap([250, -200, 190])).toHaveLength(1); // a third tap begins a new measurement
     expect((await stateNow()).measurements).toHaveLength(1);
   });
 
-  it("set no point where a ray meets nothing, and say so", async () => {
+  it("set no point where a ray meets nothing, and announce that", async () => {
     await look([0.3, 0.2, 1.6]);
     const at = await project([500, -200, 100]); // between the balls, inside both boxes
     const points = await page.evaluate((p) => window.bench?.measureAt(p.x, p.y), at);
@@ -171,7 +171,7 @@ describeInChromium("marks", () => {
     await shoot("angle-and-line");
   });
 
-  it("hold nothing on the GPU of measurements that were removed", async () => {
+  it("free the GPU memory of removed measurements", async () => {
     await look([0.1, 0.1, 1.5]);
     const clear = () =>
       page.evaluate(() => {
@@ -200,11 +200,11 @@ describeInChromium("marks", () => {
     expect(await clear()).toEqual(before);
   });
 
-  it("have labels that lie beside one another, though what they name crosses", async () => {
+  it("have labels that do not overlap, although the labelled lines cross", async () => {
     await look([0.1, 0.1, 1.5]);
     await page.evaluate(() => {
       const { bench } = window;
-      // three distances with one middle, and the values of the last one's ends
+      // Three distances have the same midpoint, and the ends of the last one have labels with values.
       for (const [x, y] of [
         [200, 0],
         [0, 100],
@@ -228,7 +228,7 @@ describeInChromium("marks", () => {
     await shoot("labels-apart");
   });
 
-  it("show the channels' values there, on the source's scale", async () => {
+  it("show the channels' values at their points, on the source's scale", async () => {
     await look([0, 0, 1.6]);
     await page.evaluate(() =>
       window.bench?.measure([
@@ -244,11 +244,11 @@ describeInChromium("marks", () => {
       page.evaluate((z) => window.bench?.measure([[750, -200, z]]), 200 + above_um);
     await measureAbove(300);
     await expect.poll(() => at(0)).toBe("");
-    await measureAbove(0.1); // surfaces end a little outside
+    await measureAbove(0.1); // surfaces extend slightly beyond the volume
     await expect.poll(() => at(0)).toBe("CD8 T cells 13107");
   });
 
-  it("have labels of the same angle from near and far", async () => {
+  it("have labels of the same angular size from near and far", async () => {
     await page.evaluate(() =>
       window.bench?.measure([
         [400, -200, 190],
@@ -267,7 +267,7 @@ describeInChromium("marks", () => {
     expect(inRoom).toBeCloseTo(STEREO_TEXT * LABEL_HEIGHT, 5);
   });
 
-  it("let a handle be dragged: the face follows the pointer, and the camera does not", async () => {
+  it("have a handle that moves a face with the pointer, while the camera stays", async () => {
     await look([0, 0, 1.6]);
     await cutOpen();
     const from = await project([100, -200, 100]);
@@ -278,7 +278,7 @@ describeInChromium("marks", () => {
     await page.mouse.move(to.x, to.y);
     await page.mouse.up();
     const { clip } = await stateNow();
-    // the pointer is on the axis of the handle: a pixel is 2.4 um there
+    // The pointer is on the axis of the handle, where a pixel is 2.4 um.
     expect(Math.abs((clip.box?.min[0] ?? 0) - 300)).toBeLessThan(1);
     expect(clip.box?.min.slice(1)).toEqual([-350, 20]);
     expect(clip.box?.max).toEqual([900, -50, 180]);
@@ -287,15 +287,15 @@ describeInChromium("marks", () => {
     expect(await page.evaluate(() => window.bench?.leaked)).toBe(1);
   });
 
-  it("let the gaze carry a handle in a headset", async () => {
+  it("have a handle that the gaze moves in a headset", async () => {
     await cutOpen();
-    // 1.2 mm of the room to a um; the specimen's middle is the room's
+    // A um is 1.2 mm in the scene, and the specimen's centre is at the origin.
     const gaze = (x_um: number) =>
       look([0, 0, 1.6], [(x_um - 500) * 1.2e-3, 0, 0], { isStereo: true });
     const meet = () => page.evaluate(() => window.bench?.meet());
     await gaze(903);
     const met = await meet();
-    // as the cut was before stereo began, only a button takes it
+    // The cut existed before stereo began, so only a button grabs the handle.
     expect(met).toMatchObject({ key: "handle:x-max", hold: "carry", isGlance: true });
     expect(met?.distance_m).toBeCloseTo(Math.hypot(1.6, 0.48), 3);
     await gaze(250);
@@ -313,7 +313,7 @@ describeInChromium("marks", () => {
     expect(await meet()).toBeNull();
   });
 
-  it("name what is looked at, once the gaze rests", async () => {
+  it("name the part under the gaze once the gaze rests", async () => {
     const name = () => page.evaluate(() => window.bench?.name());
     await look([-0.3, 0, 1.6], [-0.3, 0, 0], { dt_s: 0.1 });
     expect(await name()).toBe("");
@@ -325,7 +325,7 @@ describeInChromium("marks", () => {
         document.querySelector(each)?.getBoundingClientRect().toJSON(),
       ),
     );
-    expect(mark.bottom).toBeLessThan(bar.top); // above the scale bar, out of what is looked at
+    expect(mark.bottom).toBeLessThan(bar.top); // just above the scale bar, away from the gaze
     expect(mark.top).toBeGreaterThan(0.75 * HEIGHT);
     expect([mark.left, mark.right < WIDTH / 2]).toEqual([bar.left, true]);
     await look([0.55, 0.2, 1.6], [0.55, 0.2, 0], { dt_s: 0.1 });
@@ -342,12 +342,12 @@ describeInChromium("marks", () => {
     expect(await label()).toBe("x leads away, y up, z right");
   });
 
-  it("letter a patient's sides, on the glass and beside the specimen", async () => {
+  it("mark a patient's sides with letters, on the screen and beside the specimen", async () => {
     await page.evaluate(() => {
       window.bench?.dispose();
       const stage = document.querySelector<HTMLElement>(".stage");
       stage?.replaceChildren();
-      // a head whose left is the world's right, as the reader lays it, but lying on its back
+      // A head lies on its back, and its left is the world's +x, as in the reader's canonical axes.
       const sides = { left: [1, 0, 0], posterior: [0, -1, 0], superior: [0, 0, -1] } as const;
       const given = JSON.parse(JSON.stringify(sides));
       if (stage !== null) window.bench = window.makeBench?.(stage, given);
@@ -379,7 +379,7 @@ describeInChromium("marks", () => {
     expect(await mark.isVisible()).toBe(false);
   });
 
-  it("stand beside the specimen in a headset, and not on the glass", async () => {
+  it("stand beside the specimen in a headset, and not on the screen", async () => {
     await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true });
     const ruler = await page.evaluate(() => window.bench?.ruler());
     expect(ruler?.isVisible).toBe(true);
@@ -387,7 +387,7 @@ describeInChromium("marks", () => {
     await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isInUsersRoom: true });
     const onTable = await page.evaluate(() => window.bench?.ruler());
     const { up_um = Number.NaN } = ruler ?? {};
-    expect(up_um).toBeGreaterThan(onTable?.up_um ?? Number.NaN); // else the bar would lie before it
+    expect(up_um).toBeGreaterThan(onTable?.up_um ?? Number.NaN); // otherwise the scale bar would be in front of it
     await look([0.5, 0.4, 1.7], [0, 0, 0], { isStereo: true, isPanelOpen: true });
     const behindPanel = await page.evaluate(() => window.bench?.ruler());
     expect(behindPanel).toMatchObject({ isVisible: false, hasAxes: false });
@@ -419,7 +419,7 @@ describeInChromium("marks", () => {
     const after = await page.evaluate(() => window.bench?.memory());
     expect(before?.textures).toBeGreaterThan(bare?.textures ?? 99);
     expect(after?.textures).toBe(bare?.textures);
-    // three keeps the one square of all sprites
+    // three.js keeps one square, which all sprites share.
     expect(after?.geometries).toBe((bare?.geometries ?? 0) + 1);
   });
 });

@@ -1,4 +1,4 @@
-/** The benchmark's page: a flight in every mode, in one picture and on the split screen, and what it saves. */
+/** The benchmark's page: a flight in every mode, on the flat screen and on the split screen, and the saved report. */
 import { expect, it } from "vitest";
 import type { Report } from "../../src/bench/report";
 import { describeInChromium } from "../support/browser/skip";
@@ -7,7 +7,7 @@ import { prepareStand } from "../support/browser/stand";
 describeInChromium("the benchmark", () => {
   const stand = prepareStand({ viewport: { width: 240, height: 160 } });
 
-  it("times each mode and volume size, in stereo and in one picture, and saves what it found", async () => {
+  it("times each mode and volume size with and without stereo, and saves the report", async () => {
     await stand.open("&bench=0.05");
     const { page } = stand.viewer;
     await page.locator("[data-bench=split]").click();
@@ -31,7 +31,7 @@ describeInChromium("the benchmark", () => {
       expect(median_ms, name).toBeGreaterThan(0);
       expect(p95_ms, name).toBeGreaterThanOrEqual(median_ms);
       expect(edge === null, name).toBe(mode === "mesh");
-      // the specimen is in sight: one tile that was chosen would be less than all
+      // The specimen is visible during the flight.
       if (mode === "mesh") expect(cost.triangles, name).toBeGreaterThan(0);
       else expect(cost.volumeBytes, name).toBeGreaterThan(0);
     }

@@ -1,4 +1,4 @@
-/** Pictures larger than the screen, videos, and the file of measurements, as the page saves them. */
+/** Files that the page saves: images larger than the screen, videos, and tables of measurements. */
 import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -40,7 +40,7 @@ describeInChromium("what the page saves", () => {
 
   afterAll(() => rm(folder, { recursive: true, force: true }));
 
-  it("is a picture of four times the screen's size that shows the same, with its scale", async () => {
+  it("is an image of four times the screen's size that shows the same, with a scale bar", async () => {
     const stage = await page().locator(".stage canvas").boundingBox();
     await page().keyboard.press("0"); // from 2 to 4
     const download = await saved('"');
@@ -50,7 +50,7 @@ describeInChromium("what the page saves", () => {
       4 * (stage?.width ?? 0),
       4 * (stage?.height ?? 0),
     ]);
-    // shrunk again it is what the screen shows, but for what is said over it
+    // A reduced copy of the image equals the screen, except for announcements over the view.
     await page().evaluate(() => {
       const said = document.querySelector<HTMLElement>(".said");
       if (said !== null) said.style.visibility = "hidden";
@@ -81,10 +81,10 @@ describeInChromium("what the page saves", () => {
       },
       [png.toString("base64"), screen.toString("base64")] as const,
     );
-    expect(differing).toBeLessThan(0.06); // edges, and the legend, which the screen has not
+    expect(differing).toBeLessThan(0.06); // edges differ, and the screen has no legend
   });
 
-  it("is a video through the views that were kept, which plays", async () => {
+  it("is a video through the saved views, which plays", async () => {
     await page().keyboard.press("'");
     await page().keyboard.press("ArrowLeft");
     await stand.viewer.still();
@@ -92,7 +92,7 @@ describeInChromium("what the page saves", () => {
     const download = await saved(")");
     const file = await contentOf(download);
     expect(download.suggestedFilename()).toBe("Fixture-video.webm");
-    const blank = await page().context().newPage(); // the viewer's own lets no video in
+    const blank = await page().context().newPage(); // the viewer's own policy forbids videos
     const played = await blank.evaluate(async (base64) => {
       const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
       const video = document.createElement("video");
@@ -109,11 +109,11 @@ describeInChromium("what the page saves", () => {
     expect(played.width).toBeGreaterThan(100);
   });
 
-  it("is a zip of pictures where the browser has no encoder", async () => {
+  it("is a zip of images if the browser has no encoder", async () => {
     await page().evaluate(() => {
       Object.assign(window, { VideoEncoder: undefined });
     });
-    // as it is handed over: another download by itself the browser would ask about
+    // The file is read when the page creates it, since the browser would ask before a second automatic download.
     await page().evaluate(() => {
       const make = URL.createObjectURL.bind(URL);
       URL.createObjectURL = (blob: Blob) => {
@@ -130,7 +130,7 @@ describeInChromium("what the page saves", () => {
     });
     const zip = Buffer.from(base64, "base64");
     expect(zip.subarray(0, 4)).toEqual(Buffer.from("PK\u0003\u0004"));
-    expect(zip.readUInt16LE(zip.length - 12)).toBe(61); // of its list: two seconds and the last
+    expect(zip.readUInt16LE(zip.length - 12)).toBe(61); // entries in its list: two seconds of frames, and the last one
   });
 
   it("is a table of the measurements", async () => {
@@ -145,7 +145,7 @@ describeInChromium("a traced picture that the page saves", () => {
   const page = () => stand.viewer.page;
   const said = () => page().locator("[data-said]").textContent();
 
-  it("gathers light until it is clear, part by part, and says so", async () => {
+  it("gathers light in each part until it is clear, and reports its progress", async () => {
     await stand.open("&mode=traced&quality=low#v=1&light=many:false");
     await stand.viewer.settled();
     await page().evaluate(() => {
@@ -171,7 +171,7 @@ describeInChromium("a traced picture that the page saves", () => {
     }
   });
 
-  it("is left by the same key", async () => {
+  it("is cancelled by the same key", async () => {
     await stand.open("&mode=traced#v=1&light=many:false");
     await stand.viewer.settled();
     await page().keyboard.press('"');

@@ -1,4 +1,4 @@
-/** The page that *Preview* has opened follows the build that is started on the page of the inbox. */
+/** A page that *Preview* has opened follows a build that is started on the page of the inbox. */
 import { existsSync } from "node:fs";
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -32,7 +32,7 @@ describeInChromium("an image that is looked at before it is built", () => {
     page.on("pageerror", ({ message }) => faults.push(message));
   });
 
-  /** Open the page of an inbox that is empty. */
+  /** Opens the page of an empty inbox. */
   async function begin(): Promise<void> {
     await server?.stop("SIGTERM");
     server = await serve(`--inbox=${await mkdtemp(join(folder, "box-"))}`);
@@ -50,7 +50,7 @@ describeInChromium("an image that is looked at before it is built", () => {
   const card = () => page.locator("article").first();
   const state = () => card().locator("[data-state]").textContent();
 
-  it("gets its surfaces and its bundle without a reload, and commands its build from there", async () => {
+  it("receives surfaces and bundle without a reload, and controls the build", async () => {
     await begin();
     await drop(page, join(folder, "f.ome.tif"));
     await expect.poll(state).toBe("Ready");
@@ -65,7 +65,7 @@ describeInChromium("an image that is looked at before it is built", () => {
     const hasSurface = async () => (await viewer.snapshot()).state.channels[0].hasSurface;
     const words = () => tab.locator('[data-live="words"]').textContent();
     expect(await hasSurface()).toBe(false);
-    expect(await tab.locator(".build").count()).toBe(0); // nobody has asked for a build
+    expect(await tab.locator(".build").count()).toBe(0); // no build was requested
 
     await card().locator('[data-action="build"]').click();
     await tab.locator('[data-live="pause"]').click();

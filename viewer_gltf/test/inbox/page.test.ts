@@ -1,4 +1,4 @@
-/** The inbox: files that are dropped, sent over faults, understood, looked at, built and deleted. */
+/** The inbox: files are dropped, uploaded despite faults, recognised, previewed, built and deleted. */
 import { createHash } from "node:crypto";
 import { mkdir, mkdtemp, readdir, readFile, rm, stat, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -13,7 +13,7 @@ import { drop } from "../support/inbox/drop";
 import { FakeInbox } from "../support/inbox/fake_inbox";
 
 const KB = 1000;
-/** A DICOM series as it lies on a disk: with what a system leaves beside it. */
+/** A DICOM series on a disk, with files that an operating system leaves beside it. */
 const FILES = [
   ...Array.from({ length: 40 }, (_, i) => `series/${String(i).padStart(3, "0")}.dcm`),
   "series/deep/last.dcm",
@@ -101,7 +101,7 @@ describeInChromium("the inbox", () => {
   }
 
   async function findings(): Promise<readonly string[]> {
-    await page.evaluate(axe.source); // the page's policy allows no script of another's
+    await page.evaluate(axe.source); // the page's policy forbids scripts from other sources
     const { violations } = await page.evaluate(() =>
       window.axe.run({
         runOnly: { type: "tag", values: ["wcag2a", "wcag2aa", "wcag21aa", "best-practice"] },
@@ -111,7 +111,7 @@ describeInChromium("the inbox", () => {
     return violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html}`));
   }
 
-  it("is a small page of its own files, and lets nothing else in", async () => {
+  it("is a small page that loads only its own files", async () => {
     const html = await readFile(join(DIST, "inbox.html"), "utf8");
     const [, policy] = /http-equiv="Content-Security-Policy"\s+content="([^"]*)"/.exec(html) ?? [];
     expect(policy.split("; ").sort()).toEqual([
@@ -126,10 +126,10 @@ describeInChromium("the inbox", () => {
     );
     expect(Math.max(...sizes)).toBeLessThan(100 * KB); // three alone has 700 kB
     const worker = await readFile(join(DIST, "sw.js"), "utf8");
-    expect(worker).not.toContain("inbox"); // the viewer keeps none of it for offline
+    expect(worker).not.toContain("inbox"); // the viewer does not keep it for use offline
   });
 
-  it("takes a folder whole, though the connection is cut twice and the page is loaded again", async () => {
+  it("receives a complete folder, although the connection breaks twice and the page is reloaded", async () => {
     server.cuts.push(700 * KB + 7, 1200 * KB + 1);
     server.delay_ms = 150;
     await drop(page, join(folder, "series"));
@@ -151,7 +151,7 @@ describeInChromium("the inbox", () => {
     expect(faults).toEqual([]);
   });
 
-  it("names a file that changes on the disk meanwhile, and sends nothing of it", async () => {
+  it("names a file that changes on the disk during the upload, and does not send it", async () => {
     server.delay_ms = 150;
     await drop(page, join(folder, "series"));
     await expect.poll(() => only()?.bytes).toBeGreaterThan(300 * KB);
@@ -163,7 +163,7 @@ describeInChromium("the inbox", () => {
     expect(only().bytes).toBeLessThanOrEqual(39 * BYTES);
   });
 
-  it("goes on by one click after a reload, where the browser kept the folder", async () => {
+  it("continues with one click after a reload if the browser has kept the folder", async () => {
     server.delay_ms = 150;
     await drop(page, join(folder, "series"));
     await expect.poll(() => only()?.bytes).toBeGreaterThan(300 * KB);
@@ -175,12 +175,12 @@ describeInChromium("the inbox", () => {
     expect(faults).toEqual([]);
   });
 
-  it("shows what was understood, takes settings, opens the look, and builds", async () => {
+  it("shows what it recognised, accepts settings, opens the preview, and builds", async () => {
     await page.setInputFiles('[data-choose="files"]', join(folder, "series/001.dcm"));
     await expect.poll(() => card().locator("figure img").count()).toBe(3);
     expect(await findings()).toEqual([]);
     const { id } = only();
-    // a name or a note is never markup
+    // A name or a note is never interpreted as markup.
     expect(await card().locator("li").textContent()).toContain("<b>bold</b>");
     expect(await card().locator("dd").allTextContents()).toEqual([
       ...["DICOM, MR", "18.2 × 20.1 × 15.0 cm", "256 × 256 × 180", "0.7 × 0.7 × 0.8 mm"],
@@ -192,7 +192,7 @@ describeInChromium("the inbox", () => {
     await expect.poll(() => card().locator("dd").allTextContents()).toContain("other");
     await card().getByLabel("T2").uncheck();
     await card().getByLabel("T1").click();
-    expect(await card().getByLabel("T1").isChecked()).toBe(true); // one stays
+    expect(await card().getByLabel("T1").isChecked()).toBe(true); // at least one channel stays selected
     await expect.poll(() => server.requests.length).toBe(3);
     expect(server.requests.slice(1)).toEqual([
       `PUT items/${id}/choices {"preset":"ct"}`,
@@ -234,7 +234,7 @@ describeInChromium("the inbox", () => {
     expect(faults).toEqual([]);
   });
 
-  it("takes an address, and says what the server has against it", async () => {
+  it("accepts an address, and shows why the server refuses it", async () => {
     await page.getByLabel("Or paste an address").fill("https://host/a.ome.zarr");
     await page.keyboard.press("Enter");
     await expect
@@ -255,7 +255,7 @@ describeInChromium("the inbox", () => {
       .toBe(`PUT items/${only().id}/choices {"spacing_um":[0.5,0.5,2]}`);
   });
 
-  it("lets those who may only look, look: on a phone as well", async () => {
+  it("shows everything to users with read access only, also on a phone", async () => {
     const { id } = { id: "a1" };
     const rest = { line: "", bytes: 1, total: 1, label: "", page: `items/${id}/view/` };
     server.items = [{ ...rest, id, doing: "built", title: "x".repeat(120) }];

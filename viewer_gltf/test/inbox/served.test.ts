@@ -1,4 +1,4 @@
-/** The inbox with its server: a real MRI is uploaded over faults, looked at, and built. */
+/** The inbox with its server: a real MRI is uploaded despite faults, previewed and deleted. */
 import { existsSync } from "node:fs";
 import { mkdtemp, readdir, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -47,7 +47,7 @@ describe.skipIf(!IS_AVAILABLE)("with its server", () => {
     const state = () => card().locator("[data-state]").textContent();
     const shareOf = async () => Number(await card().locator("progress").getAttribute("value"));
 
-    it("uploads a real MRI that is interrupted twice, shows what it is, looks and deletes", async () => {
+    it("uploads a real MRI despite two interruptions, recognises it, previews it and deletes it", async () => {
       await drop(page, MRI);
       await expect.poll(shareOf).toBeGreaterThan(0.1);
       await browser.context.setOffline(true);

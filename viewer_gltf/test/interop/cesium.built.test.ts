@@ -1,4 +1,4 @@
-/** A bundle's tilesets are 3D Tiles for everyone: CesiumJS opens, decodes and draws them. */
+/** A bundle's tilesets are standard 3D Tiles: CesiumJS opens, decodes and draws them. */
 import { describe, expect, it } from "vitest";
 import type { Manifest } from "../../src/bundle/generated/bundle";
 import { hasColor, isBackground, takePicture } from "../support/browser/picture";
@@ -10,7 +10,7 @@ import { BEAM, CHANNEL, centerOf, labelOf, prepareObjects, rowAt } from "../supp
 import { hasPython } from "../support/python";
 
 const VIEWPORT = { width: 320, height: 180 };
-/** Pixels of error as Cesium counts them: the tiles' coarsest surfaces, and the finest. */
+/** Largest screen-space errors for Cesium, pixels; it then draws the coarsest and the finest surfaces. */
 const [COARSEST, FINEST] = [100, 0];
 
 function viewOf({ bounds_um: { min, max } }: Manifest["specimen"]): View {
@@ -44,7 +44,7 @@ describeInChromium("CesiumJS", () => {
   describe.skipIf(!hasPython)("with the objects of a label map", () => {
     const stand = prepareStand({ ...options, bundle: prepareObjects() });
 
-    it("styles them by their table, and tells it of one that is picked", async () => {
+    it("styles objects by their table, and returns the row of a picked one", async () => {
       const globe = await Globe.open(stand.viewer.page, stand.host);
       const address = `/bundle/channels/${CHANNEL}/tileset.json`;
       const { failed } = await globe.draw(address, viewOf(stand.manifest.specimen), FINEST);
@@ -55,7 +55,7 @@ describeInChromium("CesiumJS", () => {
         return isRed((await takePicture(stand.viewer.page)).at(x, y));
       };
       const ball = centerOf(rowAt(0, 3, 1, 1));
-      await globe.style("volume_um3", "> 300", "red"); // the beam has 400, a ball 268
+      await globe.style("volume_um3", "> 300", "red"); // the beam has 400 um3, and a ball has 268 um3
       expect(await isRedAt([60, -42.5, 16])).toBe(true);
       expect(await isRedAt(ball)).toBe(false);
       await globe.style("cell_type", "=== 'Tumour'", "red");
@@ -64,7 +64,7 @@ describeInChromium("CesiumJS", () => {
       for (const [point, row] of [
         [ball, rowAt(0, 3, 1, 1)],
         [centerOf(rowAt(1, 4, 0, 1)), rowAt(1, 4, 0, 1)],
-        [[57, -42.5, 16], BEAM], // an object in both tiles is the same in both
+        [[57, -42.5, 16], BEAM], // an object in both tiles has the same number in both
         [[63, -42.5, 16], BEAM],
       ] as const) {
         const { x, y } = await globe.pixelOf(point);
@@ -86,7 +86,8 @@ describeInChromium("CesiumJS", () => {
       const least = Math.min(...channels.map(({ triangles }) => finest(triangles)));
       for (const { id, color, tileset, triangles } of channels) {
         if (tileset === null) continue;
-        // Software draws them: the coarsest of all, and the finest of the smallest.
+        // Drawing in software is slow: all channels are drawn with the coarsest surfaces, and only the smallest with the
+        // finest.
         const errors_px = finest(triangles) === least ? [COARSEST, FINEST] : [COARSEST];
         for (const error_px of errors_px) {
           const address = `/bundle/${tileset.path}`;
@@ -97,7 +98,7 @@ describeInChromium("CesiumJS", () => {
           const drawn = picture.where((pixel) => !isBackground(pixel));
           expect(drawn.length, id).toBeGreaterThan(500);
           expect(picture.count(hasColor(color)) / drawn.length, id).toBeGreaterThan(0.9);
-          // The front of the specimen's box covers all of it.
+          // The front face of the specimen's box covers the whole specimen.
           const low = await globe.pixelOf([min[0], min[1], max[2]]);
           const high = await globe.pixelOf([max[0], max[1], max[2]]);
           const isOutside = ([x, y]: [number, number]) =>

@@ -1,6 +1,6 @@
 /**
- * The pipeline's own letter F, from voxels to the picture. STEREOCELL_F_BUNDLES holds the bundles
- * built from what tests/support/phantoms.py writes, joined by ":"; without it these tests are skipped.
+ * The pipeline's letter F, from voxels to the picture. STEREOCELL_F_BUNDLES contains the bundles of the phantoms from
+ * tests/support/phantoms.py, joined by ":". Without it these tests are skipped.
  */
 import { describe, expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
@@ -17,13 +17,13 @@ describeInChromium("the pipeline's F", () => {
   describe.each(BUNDLES)("of %s", (bundle) => {
     const stand = prepareStand({ bundle, viewport: { width: 504, height: 240 } });
 
-    // for every run each format once, as the one or the other
+    // Each run tests each format once, either as a surface or as a volume.
     const kept = BUNDLES.indexOf(bundle) % 2 === 0 ? "surface" : "volume";
     it.each(sweep(["surface", "volume"] as const, (as) => as === kept))(
       "as a %s is neither mirrored nor turned",
       async (as) => {
         const { channels } = stand.manifest;
-        expect(channels).toHaveLength(1); // DICOM and NIfTI give it no name of its own
+        expect(channels).toHaveLength(1); // DICOM and NIfTI do not name the channel
         await stand.open();
         await expectLetter(stand.viewer, stand.manifest, channels[0].id, as, PHANTOM_LETTER);
       },

@@ -8,12 +8,12 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { askPython, hasPython } from "../support/python";
 
-// as in tests/support/edited_bundle.py
+// The same values as in tests/support/edited_bundle.py.
 const OPACITY = 0.4;
 const EMISSION = [0, 0.4, 0] as const;
 const TILE_NAME = "Left half";
 
-/** The part of light that a pixel's 8 bits stand for, 0..1 (sRGB). */
+/** Returns the linear light of an 8-bit sRGB value, 0..1. */
 const linear = (v: number) => (v > 10 ? ((v / 255 + 0.055) / 1.055) ** 2.4 : v / 255 / 12.92);
 
 describeInChromium("edits of a stage", () => {
@@ -31,7 +31,7 @@ describeInChromium("edits of a stage", () => {
     mounts: () => ({ "/edits/": folder }),
   });
 
-  /** The surfaces alone, from the front; `query` goes behind the bundle's address. */
+  /** Returns a picture of only the surfaces from the front; `query` is appended to the bundle's address. */
   async function look(name: string, query = ""): Promise<Picture> {
     await stand.viewer.open(
       `${stand.host.address}/app/?bundle=../edits/${name}/&view=front&mode=off${query}#v=1&depth=0`,
@@ -40,7 +40,7 @@ describeInChromium("edits of a stage", () => {
     return takePicture(stand.viewer.page);
   }
 
-  it("shows a channel as translucent as the stage has it", async () => {
+  it("shows a channel with the opacity that the stage states", async () => {
     const [opaque, clear] = [await look("built"), await look("translucent")];
     const [x, y] = [opaque.width / 2 - 8, opaque.height / 2 - 8];
     const behind = clear.at(4, opaque.height / 2);
@@ -58,13 +58,13 @@ describeInChromium("edits of a stage", () => {
     expect(label).toContain(TILE_NAME);
   });
 
-  it("leaves a tile out that the stage draws as a guide", async () => {
+  it("leaves out a tile that is a guide in the stage", async () => {
     await look("guide");
     const { state } = await stand.viewer.snapshot();
     expect(state.tiles.map(({ id }) => id)).toEqual(["r0_c1"]);
   });
 
-  it("goes through the views of the stage's cameras, by name and in order", async () => {
+  it("shows the views of the stage's cameras by name and in order", async () => {
     await look("framed");
     const next = async (name: string) => {
       const button = { name: `Next kept view: ${name}` };
@@ -76,8 +76,8 @@ describeInChromium("edits of a stage", () => {
     const side = await next("From the side");
     expect(side.look.position[0]).toBeGreaterThan(Math.abs(10 * side.look.position[2]));
     const front = await next("From the front");
-    // Its window is 8 um high at the middle of the sphere, whose radius is 3.5 um. The viewer's own lens shows as much
-    // from nearer by.
+    // The stage camera's view is 8 um high at the centre of the sphere, whose radius is 3.5 um. The viewer's camera has
+    // another field of view, and shows the same height from nearer.
     const half = Math.tan((20 * Math.PI) / 180);
     const wanted = Math.tan(Math.asin(3.5 / (4 / half))) / half;
     const shown = front.picture.where((pixel) => !isBackground(pixel));
@@ -85,12 +85,12 @@ describeInChromium("edits of a stage", () => {
     expect(Math.abs(high / front.picture.height - wanted)).toBeLessThan(0.015);
   });
 
-  it("shows what a layer adds where the stage has it, and hides it by its name", async () => {
+  it("shows the additions of a layer at their places, and hides them by name", async () => {
     const isBlue = hasColor([0, 0, 1]);
     expect((await look("built")).count(isBlue)).toBe(0);
     const shown = (await look("added")).where(isBlue);
     expect(shown.length).toBeGreaterThan(100);
-    // the arrow stands above the sphere's middle, and is as high as the specimen's upper half and 9 um more
+    // The arrow is above the sphere's centre. Its height is that of the specimen's upper half plus 9 um.
     const middle = shown.reduce((sum, [x]) => sum + x, 0) / shown.length;
     expect(Math.abs(middle - 160)).toBeLessThan(6);
     const label = await stand.viewer.page.evaluate(() => {
@@ -112,7 +112,7 @@ describeInChromium("edits of a stage", () => {
     }
     const [opaque, wireInOpaque, clear, wireInClear] = greens;
     expect(Math.abs(wireInOpaque - opaque)).toBeLessThan(0.01);
-    expect(wireInClear - clear).toBeGreaterThan(0.1); // the wire is grey, the sphere red
+    expect(wireInClear - clear).toBeGreaterThan(0.1); // the wire is grey, and the sphere is red
   });
 
   it("adds the light that a channel emits", async () => {

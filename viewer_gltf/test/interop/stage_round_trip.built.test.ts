@@ -1,7 +1,7 @@
 /**
- * What an artist changed in a layer over the stage is what the viewer shows. tests/support/stage_edits.py makes the
- * volume and the layer; STEREOCELL_EDIT_BUNDLES holds the bundle of the stage as it was built and
- * that of the layer, joined by ":". Without it these tests are skipped.
+ * The viewer shows the changes that an artist made in a layer over the stage. tests/support/stage_edits.py makes the
+ * volume and the layer. STEREOCELL_EDIT_BUNDLES contains the bundle of the built stage and that of the layer, joined by
+ * ":". Without it these tests are skipped.
  */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
@@ -16,7 +16,7 @@ import { prepareStand, type Stand } from "../support/browser/stand";
 
 const [BUILT, EDITED] = (process.env.STEREOCELL_EDIT_BUNDLES ?? "").split(":");
 
-// as in tests/support/stage_edits.py
+// The same values as in tests/support/stage_edits.py.
 const SPACING_UM = 0.5;
 const RADIUS_UM = 4;
 const SLAB_VOXELS = 16;
@@ -24,20 +24,20 @@ const COLOR = [0.888, 0.2623, 0.0213] as const;
 const [HIDDEN, MOVED] = ["r0_c1", "r1_c1"];
 const [AS_BOTH, AS_VOLUME, COARSE] = ["r0_c0", "r0_c2", "r1_c2"];
 const COARSE_LOD = 3;
-/** In which only the colours are edited. */
+/** The tile in which only the colours are edited. */
 const PLAIN = "r1_c0";
 const MOVE_UM = [2, 7, 0] as const;
 const SLAB_OPACITY = 0.03;
 const FUNCTION = "sharp";
 
-/** The finest that is due of the others: what it is off is under a pixel. */
+/** The level of the other tiles; its error is below a pixel. */
 const DUE_LOD = 1;
 const VIEWPORT = { width: 960, height: 544 };
 
 type Vec3 = readonly [number, number, number];
 type Spot = Readonly<{ x: number; y: number }>;
 
-/** The middle of a tile's ball: tiles are 32 x 32 x 24 voxels, counted from their first centre. */
+/** Returns the centre of a tile's ball. Tiles have 32 x 32 x 24 voxels, and the first voxel's centre is the origin. */
 function centerOf(tile: string): Vec3 {
   const [, row, column] = /^r(\d)_c(\d)$/.exec(tile) ?? [];
   return [
@@ -49,10 +49,10 @@ function centerOf(tile: string): Vec3 {
 
 const plus = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 
-/** Tiles that are volumes beside surfaces have no depth shading, those of a specimen all of volumes do. */
+/** Turns depth shading off: volumes beside surfaces have none, but a specimen that is all volumes does. */
 const UNSHADED = "#v=1&depth=0";
 
-/** Show one channel alone: all of it at once, so that nothing is drawn on the way. */
+/** Shows only one channel, with a single change, so that no intermediate state is drawn. */
 async function only(stand: Stand, id: string, as: "surface" | "volume"): Promise<Picture> {
   await stand.viewer.page.evaluate(
     ([wanted, isVolume]) => {
@@ -88,7 +88,7 @@ function spot(picture: Picture, { specimen }: Manifest, point: Vec3): Spot & { r
   return { x, y, radius: at(plus(point, [RADIUS_UM, 0, 0])).x - x };
 }
 
-/** Middle and area of what is drawn within 1.4 radii of a spot. */
+/** Returns centre and area of the drawn pixels within 1.4 radii of a spot. */
 function blob(picture: Picture, { x, y, radius }: Spot & { radius: number }) {
   const near = picture
     .where((pixel) => !isBackground(pixel))
@@ -97,14 +97,14 @@ function blob(picture: Picture, { x, y, radius }: Spot & { radius: number }) {
   return { x: mean(0), y: mean(1), area: near.length };
 }
 
-/** Triangles in one level of a tile's balls. */
+/** Returns the number of triangles in one level of a tile's ball. */
 async function trianglesOf(bundle: string, tile: string, level: number): Promise<number> {
   const glb = await readFile(join(bundle, "channels", "Balls", tile, `lod${level}.glb`));
   const document = JSON.parse(glb.toString("utf8", 20, 20 + glb.readUInt32LE(12)));
   return document.accessors[document.meshes[0].primitives[0].indices].count / 3;
 }
 
-/** The greatest difference of a pixel's parts, of 255. */
+/** Returns the largest difference of a pixel's components, of 255. */
 function apart(a: Picture, b: Picture, x: number, y: number): number {
   const other = b.at(x, y);
   return Math.max(...a.at(x, y).map((v, i) => Math.abs(v - other[i])));
@@ -122,11 +122,11 @@ describeInChromium("an artist's layer over the stage", () => {
     return picture;
   };
 
-  // One view of both: the edits leave the specimen's box as it is.
+  // Both bundles have the same view, because the edits do not change the specimen's box.
   describe("the stage as built", () => {
     const stand = prepareStand({ bundle: BUILT, viewport: VIEWPORT });
 
-    it("shows a ball in each tile, and blocks that are opaque", async () => {
+    it("shows a ball in each tile, and opaque blocks", async () => {
       await stand.open(UNSHADED);
       const balls = await only(stand, "Balls", "surface");
       for (const { id } of stand.manifest.tiles) {
@@ -134,7 +134,7 @@ describeInChromium("an artist's layer over the stage", () => {
         expect(isDrawn(balls, x, y), id).toBe(true);
       }
       expect(balls.count(hasColor(COLOR))).toBe(0);
-      // What it looks like when a person picks in the panel what the layer sets.
+      // The expected picture has the layer's settings, chosen in the panel.
       await stand.viewer.recolor("Balls", toHex(COLOR));
       for (const as of ["surface", "volume"] as const) {
         pictures.set(`balls as a ${as}`, await only(stand, "Balls", as));
@@ -144,7 +144,7 @@ describeInChromium("an artist's layer over the stage", () => {
       await stand.viewer.chooseTransferFunction("Slab", "default");
       await stand.viewer.recolor("Slab", "#ffffff");
       const slab = await takePicture(stand.viewer.page);
-      // all of the light that falls on it: where it is seen through there is the dark room
+      // An opaque block returns all light that falls on it; otherwise the dark background would show through.
       const place = spot(slab, stand.manifest, centerOf("r1_c0"));
       expect(lightAt(slab, place)).toBeGreaterThan(0.95 * lightFacing(slab, place));
 
@@ -158,17 +158,17 @@ describeInChromium("an artist's layer over the stage", () => {
   describe("the layer", () => {
     const stand = prepareStand({ bundle: EDITED, viewport: VIEWPORT, sharesPage: true });
     let isOpen = false;
-    /** The page as an earlier test left it: each chooses all that it looks at. */
+    /** Opens the page unless an earlier test has done so; each test sets everything that it looks at. */
     async function openOnce(): Promise<void> {
       if (!isOpen) await stand.open(UNSHADED);
       isOpen = true;
     }
 
-    /** Whether a pixel lies where the edits change the silhouettes, those of a coarse surface too. */
+    /** Returns whether the edits may change the silhouettes at a pixel, including that of the coarse surface. */
     function isTouched(picture: Picture, x: number, y: number): boolean {
       const places: [Vec3, number][] = [HIDDEN, MOVED].map((tile) => [centerOf(tile), 1.4]);
       places.push([plus(centerOf(MOVED), MOVE_UM), 1.4]);
-      // few corners that keep the ball's volume reach farther than it
+      // A coarse surface with the volume of the ball has corners outside the ball.
       places.push([centerOf(COARSE), 1.6]);
       return places.some(([place, radii]) => {
         const at = spot(picture, stand.manifest, place);
@@ -183,7 +183,7 @@ describeInChromium("an artist's layer over the stage", () => {
       await stand.viewer.settled();
     }
 
-    /** The greatest difference of two pictures of the balls in one tile's. */
+    /** Returns the largest difference of two pictures within one tile's ball. */
     function apartIn(tile: string, a: Picture, b: Picture): number {
       const { x, y, radius } = spot(a, stand.manifest, centerOf(tile));
       let farthest = 0;
@@ -197,7 +197,7 @@ describeInChromium("an artist's layer over the stage", () => {
     }
 
     it("opens with a tile as its volume and no surface, one as both, the others as surfaces", async () => {
-      await stand.open(UNSHADED); // anew: this is of how it opens
+      await stand.open(UNSHADED); // a new page, because this test is about the opening
       isOpen = true;
       await stand.viewer.show("Slab", false);
       await stand.viewer.show("Sheet", false);
@@ -212,7 +212,7 @@ describeInChromium("an artist's layer over the stage", () => {
       const { volumes } = await stand.viewer.snapshot();
       expect(volumes.map(({ tile }) => tile).sort()).toEqual([AS_BOTH, AS_VOLUME]);
 
-      // the user has the last word
+      // The user's choice overrides the layer.
       await stand.viewer.drawVolume("Balls", false);
       const asked = await takePicture(stand.viewer.page);
       expect(apartIn(AS_VOLUME, asked, surface)).toBeLessThanOrEqual(2);
@@ -231,7 +231,7 @@ describeInChromium("an artist's layer over the stage", () => {
           at(centerOf(MOVED)),
           at(plus(centerOf(MOVED), MOVE_UM)),
         ];
-        // The moved ball ends below the gap's upper half and above its own old lower half.
+        // The moved ball covers neither the upper half of the gap nor the lower half of its own old place.
         for (const share of [0.3, 0.6, 0.9]) {
           expect(isDrawn(before, hidden.x, hidden.y - share * hidden.radius)).toBe(true);
           expect(isDrawn(after, hidden.x, hidden.y - share * hidden.radius)).toBe(false);
@@ -244,7 +244,7 @@ describeInChromium("an artist's layer over the stage", () => {
         expect(to.area / from.area).toBeGreaterThan(0.97);
         expect(to.area / from.area).toBeLessThan(1.03);
 
-        // All else is as if a person had picked the colour in the panel.
+        // All other pixels equal those after choosing the colour in the panel.
         let [shared, farthest] = [0, 0];
         for (let y = 0; y < after.height; y++) {
           for (let x = 0; x < after.width; x++) {
@@ -258,7 +258,7 @@ describeInChromium("an artist's layer over the stage", () => {
       },
     );
 
-    it("draws a tile at the level of detail that was chosen, and the others as fine as is due", async () => {
+    it("draws a tile at the chosen level of detail, and the others at the level for the view", async () => {
       await openOnce();
       await chooseQuality("high");
       const picture = await only(stand, "Balls", "surface");
@@ -282,14 +282,14 @@ describeInChromium("an artist's layer over the stage", () => {
       const expected = 1 - (1 - SLAB_OPACITY) ** (SLAB_VOXELS / cosine);
       const at = spot(picture, stand.manifest, point);
       const [found, facing] = [lightAt(picture, at), lightFacing(picture, at)];
-      // all but its faces has the light of what has no boundary
+      // Inside, apart from its faces, the block is lit like a medium without a boundary.
       expect(Math.abs(found / (SCATTERED * facing) - expected)).toBeLessThan(0.02);
     });
 
     it("opens with the transfer function of the chosen variant", async () => {
       await openOnce();
       const chosen = await only(stand, "Sheet", "volume");
-      // In a tile that was neither hidden nor moved: as if a person had chosen it in the panel.
+      // A tile that was neither hidden nor moved looks the same as after choosing the function in the panel.
       const { x, y, radius } = spot(chosen, stand.manifest, centerOf("r1_c0"));
       const steps = [-0.9, -0.6, -0.3, 0, 0.3, 0.6, 0.9].map((share) => share * radius);
       const farthest = (name: string) =>

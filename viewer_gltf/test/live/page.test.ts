@@ -1,4 +1,4 @@
-/** A source in the page while it is built: paused, continued, seen to complete, without a jump of the view. */
+/** A source in the page while it is built: the build is paused, continued and completed, and the view never jumps. */
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -33,12 +33,12 @@ describeInChromium("a source that is built behind the page", () => {
     viewer = new ViewerPage(page);
   });
 
-  /** Open the page of a build that is paused before anything is built. */
+  /** Opens the page of a build, and pauses it before anything is built. */
   async function begin(): Promise<void> {
     await server?.stop("SIGTERM");
     rmSync(out, { recursive: true, force: true });
     server = await serve(source, flags);
-    // before the page draws, which may take a busy machine longer than the build of so small a source
+    // The build is paused before the page draws, since a busy machine may draw for longer than this small build takes.
     await page.goto(`${server.address}sw.js`);
     await page.evaluate(
       () =>
@@ -66,7 +66,7 @@ describeInChromium("a source that is built behind the page", () => {
 
   const hasSurface = async () => (await viewer.snapshot()).state.channels[0].hasSurface;
 
-  it("shows its coarse volumes at once, and its surfaces at the end, as the user has set the view", async () => {
+  it("shows coarse volumes at once, and surfaces at the end, and keeps the user's view", async () => {
     await begin();
     const faults: string[] = [];
     page.on("pageerror", ({ message }) => faults.push(message));
@@ -79,7 +79,7 @@ describeInChromium("a source that is built behind the page", () => {
     const middle = first.at(first.width / 2, first.height / 2);
     expect(isBackground(middle), "volumes without a build").toBe(false);
 
-    // the line of the build is as wide as the page, however narrow that is
+    // The line of the build is as wide as the page, also in a narrow window.
     const { width, height } = page.viewportSize() as { width: number; height: number };
     await page.setViewportSize({ width: 320, height });
     const widths = () =>
@@ -93,7 +93,7 @@ describeInChromium("a source that is built behind the page", () => {
     await viewer.recolor(state.channels[0].id, "#33cc66");
     await viewer.drag([200, 200], [260, 230]);
     const before = await look();
-    // a picture of another size is cleared when it takes the place of the one before
+    // The new canvas must have the size of the old one, since resizing would clear it.
     const sizes = page.waitForFunction(() => {
       const stages = ["#app.preparing", "#app:not(.preparing)"].map((app) =>
         document.querySelector(`${app}:has(.panel) .stage`),
@@ -118,7 +118,7 @@ describeInChromium("a source that is built behind the page", () => {
     expect(Math.max(...moved)).toBeLessThan(0.002);
     expect(after.state.channels[0].color[1]).toBeGreaterThan(after.state.channels[0].color[0]);
     expect(await page.locator("#app").count()).toBe(1);
-    expect(await page.locator("canvas").count()).toBeLessThanOrEqual(2); // the picture's, and the axes'
+    expect(await page.locator("canvas").count()).toBeLessThanOrEqual(2); // one of the view, and one of the axes
     const last = await takePicture(page);
     const [r, g, b] = last.at(last.width / 2, last.height / 2);
     expect(g).toBeGreaterThan(Math.max(r, b));
@@ -133,7 +133,7 @@ describeInChromium("a source that is built behind the page", () => {
     expect(await hasSurface()).toBe(true);
   });
 
-  it("finds its build finished when it is served again, and its picture outlives the server", async () => {
+  it("finds its build finished when it is served again, and keeps its picture after the server has stopped", async () => {
     await server?.stop("SIGTERM");
     server = await serve(source, flags);
     await viewer.open(server.address);
@@ -144,7 +144,7 @@ describeInChromium("a source that is built behind the page", () => {
     const notices = async () => (await viewer.snapshot()).state.notices.join();
     await expect.poll(notices).toMatch(/^The host does not answer/);
     await viewer.settled();
-    // half a second on a machine that is free; the connection is given up after 18.5 s
+    // This takes half a second on an idle machine; the connection is abandoned only after 18.5 s.
     expect(performance.now() - began_ms, "ms until nothing is awaited").toBeLessThan(15_000);
     const picture = await takePicture(page);
     expect(isBackground(picture.at(picture.width / 2, picture.height / 2))).toBe(false);
@@ -174,7 +174,7 @@ describeInChromium("a source of more voxels than a first view has", () => {
     rmSync(folder, { recursive: true, force: true });
   });
 
-  /** The picture of the first view, once nothing more comes. */
+  /** Returns the picture of the first view after everything has loaded. */
   async function see(hasBricks: boolean) {
     const page = await browser.context.newPage();
     const counted = { bricks: 0, files: 0 };

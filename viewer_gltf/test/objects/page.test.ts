@@ -1,4 +1,4 @@
-/** Objects of a label map in the page: coloured, left out, picked, cut, found, in a link, as a file. */
+/** Objects of a label map in the page: colours, filters, picking, cuts, search, links and files. */
 import { expect, it } from "vitest";
 import { project } from "../support/browser/camera";
 import { restBetweenFrames } from "../support/browser/chromium";
@@ -32,7 +32,7 @@ describeInChromium("the objects of a label map", () => {
   });
   const control = (part: string) =>
     stand.viewer.page.locator(`[data-control="${CHANNEL}/objects-${part}"]`);
-  /** With the section of the objects open, as a reader opens it. */
+  /** Opens the page and the panel's section of objects. */
   const open = async (query = "") => {
     await stand.open(query);
     await stand.viewer.unfold("objects");
@@ -40,7 +40,7 @@ describeInChromium("the objects of a label map", () => {
   const view = async () => (await stand.viewer.snapshot()).state.objects[CHANNEL];
   const shown = () => control("count").innerText();
 
-  /** Where a place shows in the stage's picture. */
+  /** Returns the pixel at which a place shows. */
   const spot = (picture: Picture, point: readonly [number, number, number]) =>
     project(point, stand.manifest.specimen.bounds_um, picture.width, picture.height);
   const at = (picture: Picture, point: readonly [number, number, number]) => {
@@ -59,7 +59,7 @@ describeInChromium("the objects of a label map", () => {
     await stand.viewer.settled();
   };
 
-  it("open in the colours of the table's own column, in one draw call a tile, in a panel for names of any length", async () => {
+  it("open in the colours of the table's own column, with one draw call per tile and a panel that fits long names", async () => {
     await open();
     await stand.viewer.settled();
     const picture = await takePicture(stand.viewer.page);
@@ -71,11 +71,11 @@ describeInChromium("the objects of a label map", () => {
     ]) {
       expect(hasColor(COLORS[row % 3])(at(picture, centerOf(row))), `row ${row}`).toBe(true);
     }
-    expect(hasColor(COLORS[BEAM % 3])(at(picture, [57, -42.5, 16]))).toBe(true); // in either tile
+    expect(hasColor(COLORS[BEAM % 3])(at(picture, [57, -42.5, 16]))).toBe(true); // in both tiles
     expect(hasColor(COLORS[BEAM % 3])(at(picture, [63, -42.5, 16]))).toBe(true);
     expect(await shown()).toContain(`${COUNT} of ${COUNT} objects`);
     expect((await stand.viewer.snapshot()).drawCalls).toBeLessThan(20);
-    // and no word of volumes, which there are none of
+    // The hint does not mention volumes, because there are none.
     const { page } = stand.viewer;
     const hint = page.locator('[data-overlay="hint"]');
     expect(await hint.textContent()).toBe("drag to turn, wheel to zoom");
@@ -85,7 +85,7 @@ describeInChromium("the objects of a label map", () => {
     expect(sections).toContain("objects");
     for (const id of ["volumes", "light", "slices"]) expect(sections).not.toContain(id);
 
-    // A column with a long name makes the panel no wider.
+    // A column with a long name does not widen the panel.
     const [wide, inside] = await control("color-by").evaluate((found) => {
       const select = found as HTMLSelectElement;
       select.options[1].text = "Intensity_MeanIntensityEdge_OrigNuclei_of_a_long_name";
@@ -96,7 +96,7 @@ describeInChromium("the objects of a label map", () => {
     expect(wide).toBeLessThan(inside);
   });
 
-  it("are coloured anew by one upload of a byte an object", async () => {
+  it("are recoloured with one upload of a byte per object", async () => {
     await open();
     await stand.viewer.settled();
     await stand.viewer.page.evaluate(() => {
@@ -121,11 +121,11 @@ describeInChromium("the objects of a label map", () => {
       stand.viewer.page.evaluate(() =>
         (window as never as { uploads: number[] }).uploads.splice(0),
       );
-    expect((await uploads()).sort()).toEqual([1024, 256]); // the palette's table comes with the kind of column
+    expect((await uploads()).sort()).toEqual([1024, 256]); // another kind of column also needs another palette
     await choose("color-by", "x_um");
     await choose("color-by", "CD8");
     for (const bytes of await uploads()) expect([256, 1024]).toContain(bytes);
-    // and the swatch beside the channel's name has the palette instead of one colour
+    // The swatch beside the channel's name shows the palette instead of one colour.
     const swatch = stand.viewer.page.locator(`[data-control="${CHANNEL}/color"]`);
     const shown = () => swatch.evaluate((input) => input.style.getPropertyValue("--shows"));
     await expect.poll(shown).toMatch(/^linear-gradient\(90deg,#440154 .*#fde725/);
@@ -134,10 +134,10 @@ describeInChromium("the objects of a label map", () => {
     expect(brightness(rowAt(1, 4, 1, 1))).toBeGreaterThan(brightness(rowAt(0, 0, 1, 1)) + 40);
   });
 
-  it("are left out by category and by range, counted, and draw in from their walls by the gap", async () => {
+  it("are filtered by category and by range, counted, and shrink from their interfaces by the gap", async () => {
     await open();
     await stand.viewer.settled();
-    const row = rowAt(0, 3, 1, 1); // 23, of category 2
+    const row = rowAt(0, 3, 1, 1); // row 23 has category 2
     await control("column-cell_type").click({ position: { x: 20, y: 60 } });
     await stand.viewer.settled();
     expect((await view()).without.cell_type).toEqual([2]);
@@ -146,7 +146,7 @@ describeInChromium("the objects of a label map", () => {
       false,
     );
     await choose("filter-by", "x_um");
-    await control("range-x_um-high").fill("127"); // the middle: all of the first tile
+    await control("range-x_um-high").fill("127"); // the middle of the range; only the first tile passes
     await stand.viewer.settled();
     const { ranges } = await view();
     expect(ranges.x_um[1]).toBe(128);
@@ -157,23 +157,23 @@ describeInChromium("the objects of a label map", () => {
     await stand.viewer.settled();
     expect(await shown()).toContain(`${COUNT} of ${COUNT}`);
 
-    // All of them draw in from their walls by the gap.
+    // All objects shrink from their interfaces by the gap.
     const drawn = async () =>
       (await takePicture(stand.viewer.page)).count((pixel) => !isBackground(pixel));
     const before = await drawn();
     await control("gap").fill("20");
     await stand.viewer.settled();
-    expect((await view()).gap_um).toBeCloseTo(2, 1); // half of its 40 steps, of half a ball's width
+    expect((await view()).gap_um).toBeCloseTo(2, 1); // 20 of the 40 steps, which are half a ball's width together
     expect(await drawn()).toBeLessThan(0.75 * before);
-    const aside = rowAt(0, 0, 1, 1); // nothing lies to the left of it
+    const aside = rowAt(0, 0, 1, 1); // there is no object to its left
     const [x, y, z] = centerOf(aside);
-    await tap([x - 3.5, y, z]); // of a radius of 4 um, 3 are left
+    await tap([x - 3.5, y, z]); // the radius of 4 um has shrunk to 3 um
     expect((await view()).picked).toBeNull();
     await tap([x - 2.5, y, z]);
     expect((await view()).picked).toBe(aside);
   });
 
-  it("open their card by a tap, with all columns; a hidden one lets the tap through", async () => {
+  it("open their card with all columns on a tap, and hidden objects let the tap pass", async () => {
     await open();
     await stand.viewer.settled();
     await tap(centerOf(FRONT));
@@ -187,7 +187,7 @@ describeInChromium("the objects of a label map", () => {
     await control("hide").click();
     await tap(centerOf(FRONT));
     expect((await view()).picked).toBe(BEHIND);
-    await tap(centerOf(FRONT)); // once more: closed
+    await tap(centerOf(FRONT)); // a second tap closes the card
     expect((await view()).picked).toBeNull();
     await tap([63, -42.5, 16]);
     expect((await view()).picked).toBe(BEAM);
@@ -198,7 +198,7 @@ describeInChromium("the objects of a label map", () => {
     expect(isBackground(at(picture, centerOf(BEHIND)))).toBe(true);
   });
 
-  it("open their card in view, with what can be done", async () => {
+  it("open their card within the view, with its commands", async () => {
     const { page } = stand.viewer;
     await open();
     await stand.viewer.settled();
@@ -213,7 +213,7 @@ describeInChromium("the objects of a label map", () => {
     for (const part of ["card", "fly", "only", "hide"]) {
       await expect.poll(() => isInView(part), { message: part }).toBe(true);
     }
-    await tap(centerOf(FRONT)); // closed
+    await tap(centerOf(FRONT)); // closes the card
     await page.locator(".panel .body").evaluate((body) => body.scrollTo(0, 0));
     await page.emulateMedia({ reducedMotion: "reduce" });
     await tap(centerOf(FRONT));
@@ -222,20 +222,20 @@ describeInChromium("the objects of a label map", () => {
     expect(await page.evaluate(() => scrollY)).toBe(0);
   });
 
-  it("open their card by a gaze that rests, which is no step to undo", async () => {
+  it("open their card if the gaze rests, which is not a step to undo", async () => {
     const { page } = stand.viewer;
     await restBetweenFrames(page);
     await open();
     await stand.viewer.settled();
     await page.locator('[data-action="split"]').dispatchEvent("click");
     await page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
-    // the specimen is moved until a ball is straight ahead: 10 um a step
+    // The specimen moves until a ball is straight ahead, by 10 um per step.
     for (const key of ["Shift+ArrowUp", "Shift+ArrowUp", "Shift+ArrowLeft", "Shift+ArrowLeft"]) {
       await page.keyboard.press(key);
       await stand.viewer.drawn(2);
     }
     const ahead = rowAt(0, 3, 0, 1);
-    await page.waitForTimeout(2500); // what has come under a resting gaze was not looked for
+    await page.waitForTimeout(2500); // an object that moved under a resting gaze opens no card
     expect((await view())?.picked).toBeUndefined();
     for (const alpha of [0, 20, 0]) {
       await page.evaluate((degrees) => {
@@ -243,21 +243,21 @@ describeInChromium("the objects of a label map", () => {
         dispatchEvent(new DeviceOrientationEvent("deviceorientation", turn));
       }, alpha);
       await stand.viewer.drawn(2);
-      await page.waitForTimeout(700); // the first time so that it is ahead
+      await page.waitForTimeout(700); // the first movement brings the object ahead
       await stand.viewer.drawn(2);
     }
     await expect.poll(async () => (await view())?.picked).toBe(ahead);
     expect((await stand.viewer.snapshot()).told).toContain(`Object ${labelOf(ahead)}`);
-    await page.waitForTimeout(2500); // it goes on resting there: the card stays
+    await page.waitForTimeout(2500); // the gaze still rests there, so the card stays
     expect((await view()).picked).toBe(ahead);
     await page.keyboard.press("Control+z");
     expect((await view()).picked).toBe(ahead);
   });
 
-  it("are found by number and flown to", async () => {
+  it("are found by number, and the camera flies to them", async () => {
     await open();
     await stand.viewer.settled();
-    // one that lies behind another is seen from elsewhere
+    // For an object behind another one, the camera moves to a place from which it is visible.
     await control("search").fill(String(labelOf(BEHIND)));
     await control(`found-${BEHIND}`).click();
     await stand.viewer.settled();
@@ -281,8 +281,8 @@ describeInChromium("the objects of a label map", () => {
     expect(isBackground(middle)).toBe(false);
   });
 
-  it("that are cut open are capped in their own colour", async () => {
-    await open("#v=1&cut=0,0,1,18"); // through the middles of those in front
+  it("have caps in their own colour if they are cut open", async () => {
+    await open("#v=1&cut=0,0,1,18"); // through the centres of the objects in front
     await stand.viewer.settled();
     const picture = await takePicture(stand.viewer.page);
     for (const row of [rowAt(0, 2, 1, 1), rowAt(0, 3, 1, 1), FRONT, rowAt(1, 2, 1, 1)]) {
@@ -294,7 +294,7 @@ describeInChromium("the objects of a label map", () => {
     }
   });
 
-  it("are selected by a lasso in the plot, saved as a file, and all of it is in the link", async () => {
+  it("are selected by a lasso in the plot and saved as a file, and the link contains all settings", async () => {
     await open();
     await stand.viewer.settled();
     const { page } = stand.viewer;
@@ -355,7 +355,7 @@ describeInChromium("a stain that is painted on objects", () => {
     viewport: { width: 900, height: 500 },
   });
 
-  it("lies over their colour, and can be taken off; a column's colour stays beside it", async () => {
+  it("lies over their colour and can be removed, and a column's colours remain available", async () => {
     await stand.open();
     await stand.viewer.unfold("objects");
     await stand.viewer.settled();
@@ -377,7 +377,7 @@ describeInChromium("a stain that is painted on objects", () => {
     const [above, below] = await spots();
     expect(own(below)).toBe(true);
     expect(own(above)).toBe(false);
-    expect(Math.max(...above) - Math.min(...above)).toBeLessThan(12); // nobody has DNA's colour: white
+    expect(Math.max(...above) - Math.min(...above)).toBeLessThan(12); // DNA has no colour of its own, so it is white
     await stand.viewer.page.locator(`[data-control="${CHANNEL}/objects-stain"]`).click();
     await stand.viewer.settled();
     const bare = await spots();

@@ -1,4 +1,4 @@
-/** The words about a visit without a network are true: every place that they promise shows as it was seen. */
+/** The announcements about a visit without a network are true: each tile that they promise shows like before. */
 import { cp, mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -11,7 +11,7 @@ import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
 
-/** Of the picture's pixels, beside those that blend differently from one drawing to the next. */
+/** Share of pixels that may differ, in addition to those that blend differently each time they are drawn. */
 const SAME = 0.002;
 
 describeInChromium("the words about a visit without a network", () => {
@@ -23,7 +23,7 @@ describeInChromium("the words about a visit without a network", () => {
   beforeAll(async () => {
     root = await mkdtemp(join(tmpdir(), "stereocell-places-"));
     await cp(inject("fixture"), root, { recursive: true });
-    await cp(DIST, root, { recursive: true }); // the bundle holds its viewer, as on any host
+    await cp(DIST, root, { recursive: true }); // the bundle contains its viewer, like on any host
     host = await Host.start({ "/": root });
   });
 
@@ -73,7 +73,7 @@ describeInChromium("the words about a visit without a network", () => {
     await viewer.settled();
   }
 
-  it("promise every place once each has been seen, and each shows without a network", async () => {
+  it("promise every tile after each was shown, and each shows without a network", async () => {
     const all = await tiles();
     const first = `Kept for offline: the overview and 1 of ${all.length} tiles. Each tile that you look at from near is kept, too.`;
     await expect.poll(said).toEqual([first]);
@@ -83,7 +83,7 @@ describeInChromium("the words about a visit without a network", () => {
     await expect.poll(offline).toBe("ready");
     expect(await said()).toEqual([first, expect.stringMatching(/^Ready offline: /)]);
 
-    await viewer.page.waitForTimeout(1000); // the last place is in the address by then
+    await viewer.page.waitForTimeout(1000); // the address then contains the last view
     const atLast = await takePicture(viewer.page);
     await browser.context.setOffline(true);
     const asked = host.requests.length;
@@ -96,10 +96,10 @@ describeInChromium("the words about a visit without a network", () => {
     }
     expect(await notices()).toEqual([]);
     expect(host.requests.length).toBe(asked);
-    expect(await said()).toEqual([]); // it has been announced
+    expect(await said()).toEqual([]); // an earlier visit has announced it
   });
 
-  it("name the tiles that are kept; elsewhere the page speaks of being offline, until it is online", async () => {
+  it("name the number of kept tiles; elsewhere the page reports that it is offline, until it is online", async () => {
     const [volume] = (await viewer.snapshot()).volumes;
     await expect.poll(offline).toBe("partly");
     const other = (await tiles()).find((tile) => tile !== volume.tile) ?? "";

@@ -1,4 +1,4 @@
-/** One visit of 40 s is enough, or less: without a network the same picture comes again, and no notice. */
+/** A visit of at most 40 s is enough to show the same picture without a network, and without a notice. */
 import { cp, mkdtemp, readdir, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -14,10 +14,10 @@ import { DIST, MAPS_BUNDLE } from "../support/browser/stand";
 import { Gate } from "../support/offline/gate";
 
 const VISIT_MS = 40_000;
-/** Share of pixels that may differ: what is gathered at rest is noise, averaged. */
+/** Share of pixels that may differ, because of the averaged noise of a view at rest. */
 const SAME = 0.01;
 
-/** The parts of the page for stereo, slices and light that the page can't get now. */
+/** Returns the parts of the page for stereo, slices and light that can't be fetched now. */
 async function missing(page: Page): Promise<readonly string[]> {
   const LATER = /^(interaction|split_session|slices|path_tracer|view_sharing)-.*\.js$/;
   const names = (await readdir(join(DIST, "assets"))).filter((name) => LATER.test(name));
@@ -40,7 +40,7 @@ describeInChromium("a first visit", () => {
 
   beforeAll(async () => {
     root = await mkdtemp(join(tmpdir(), "stereocell-visit-"));
-    // with textures that are transcoded, whose decoder is fetched on its own
+    // If available, a bundle with transcoded textures is used, whose decoder is fetched separately.
     await cp(MAPS_BUNDLE ?? inject("fixture"), root, { recursive: true });
     await cp(DIST, root, { recursive: true });
     host = await Host.start({ "/": root });
@@ -55,7 +55,7 @@ describeInChromium("a first visit", () => {
     if (root !== undefined) await rm(root, { recursive: true, force: true });
   });
 
-  it("announces how much is kept; then the network goes, and a reload shows the same", async () => {
+  it("announces how much is kept, and a reload without a network shows the same", async () => {
     const viewer = new ViewerPage(await browser.context.newPage());
     const { page } = viewer;
     await page.addInitScript(() => {
@@ -86,7 +86,7 @@ describeInChromium("a first visit", () => {
     expect(host.requests.length).toBe(asked);
     expect(before.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     expect(difference(before, after)).toBeLessThan(SAME);
-    expect(await said()).toEqual([]); // it has been said
+    expect(await said()).toEqual([]); // the first visit has announced it
     expect(await missing(page)).toEqual([]);
   });
 });

@@ -1,4 +1,4 @@
-/** Seen once, shown without a network; and what changes on the host is fetched anew. */
+/** Parts that were shown once also show without a network, and files that change on the host are fetched again. */
 import { cp, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -19,10 +19,10 @@ const CHANGED = "channels/Balls/r0_c0/lod2.glb";
 const OTHER = "channels/Balls/r0_c1/lod2.glb";
 
 const offlineState = () => document.documentElement.dataset.offline;
-/** All that was shown is kept, be it every place or not. */
+/** Runs in the page: whether everything that was shown is kept. */
 const isReady = () => /^(partly|ready)$/.test(document.documentElement.dataset.offline ?? "");
 
-/** Hashes of what is kept of the bundle; a part of a file with its range. */
+/** Hashes of the bundle's kept files, with the range for a part of a file. */
 const keptFiles = (page: Page) =>
   page.evaluate(async () => {
     const found: string[] = [];
@@ -46,13 +46,13 @@ describeInChromium("without a network", () => {
   beforeAll(async () => {
     root = await mkdtemp(join(tmpdir(), "stereocell-offline-"));
     await cp(inject("fixture"), root, { recursive: true });
-    await cp(DIST, root, { recursive: true }); // the bundle holds its viewer, as on any host
+    await cp(DIST, root, { recursive: true }); // the bundle contains its viewer, like on any host
     host = await Host.start({ [FOLDER]: root, "/other/": root });
     gate = await Gate.before(host.address);
   });
 
   beforeEach(async () => {
-    browser = await openBrowser({ viewport: { width: 400, height: 300 } }); // in a profile of its own: nothing kept
+    browser = await openBrowser({ viewport: { width: 400, height: 300 } }); // with a new profile, which has no kept files
     viewer = new ViewerPage(await browser.context.newPage());
   });
 
@@ -68,13 +68,13 @@ describeInChromium("without a network", () => {
     await rm(root, { recursive: true, force: true });
   });
 
-  /** With a volume in every tile. */
+  /** Opens the bundle with a volume in every tile. */
   async function open(query = "&mode=all"): Promise<void> {
     await viewer.open(`${gate.address}${FOLDER}?quality=low${query}`);
     await viewer.settled();
   }
 
-  it("the page shows what it showed before: surfaces and volumes", async () => {
+  it("the page shows the same surfaces and volumes as before", async () => {
     const look = async () => {
       await open("&mode=off");
       const { triangles } = await viewer.snapshot();
@@ -90,7 +90,7 @@ describeInChromium("without a network", () => {
     expect(before.volumes.length).toBeGreaterThan(0);
     expect(before.inside.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     await viewer.page.waitForFunction(isReady);
-    // What the worker has served since it took over is written down a moment later.
+    // The worker writes its ledger a moment after it has served a file.
     await viewer.page.waitForTimeout(1000);
 
     gate.shut();
@@ -103,7 +103,7 @@ describeInChromium("without a network", () => {
     expect(host.requests.length).toBe(asked);
   });
 
-  it("the file for iOS's own viewer is kept where it is small, and only there", async () => {
+  it("the file for iOS's own viewer is kept only if it is small", async () => {
     const hash = await hashOf(join(root, "specimen.usdz"));
     const isThere = async () => (await keptFiles(viewer.page)).includes(hash);
     await open("&mode=off");
@@ -119,7 +119,7 @@ describeInChromium("without a network", () => {
     await expect.poll(isThere).toBe(true);
   });
 
-  it("parts of files are kept as parts, by what they hold", async () => {
+  it("parts of files are kept under their hash and range", async () => {
     await open();
     await viewer.drawVolume("Block", true);
     await viewer.page.waitForFunction(isReady);
@@ -129,12 +129,12 @@ describeInChromium("without a network", () => {
     for (const key of await parts()) expect(key).toMatch(/\?bytes%3D\d+-\d+$/);
   });
 
-  it("a part that was kept spoilt is fetched anew", async () => {
+  it("a damaged kept part is fetched again", async () => {
     await open();
     await viewer.drawVolume("Block", true);
     await viewer.page.waitForFunction(isReady);
     const hash = await hashOf(join(root, "volumes/r0_c0/Block.ktx2"));
-    /** Changes a byte of every kept part of the file, if asked; the sums of their bytes. */
+    /** Returns the sums of the bytes of all kept parts of the file; first changes a byte of each if `isSpoilt`. */
     const sums = (isSpoilt: boolean) =>
       viewer.page.evaluate(
         async ([hash, isSpoilt]) => {
@@ -168,13 +168,13 @@ describeInChromium("without a network", () => {
     await viewer.drawVolume("Block", true);
     expect((await viewer.snapshot()).state.notices).toEqual([]);
     const isMended = async () => {
-      const found = new Map(await sums(false)); // and what may have come since
+      const found = new Map(await sums(false)); // including parts that were kept since then
       return good.every(([url, sum]) => found.get(url) === sum);
     };
     await expect.poll(isMended).toBe(true);
   });
 
-  it("a file that changes on the host is fetched anew, the others are not", async () => {
+  it("only a file that changes on the host is fetched again", async () => {
     await open("");
     await viewer.page.waitForFunction(isReady);
     await viewer.page.waitForTimeout(500);
@@ -182,7 +182,7 @@ describeInChromium("without a network", () => {
     expect(await keptFiles(viewer.page)).toContain(old);
     expect(await keptFiles(viewer.page)).toContain(await hashOf(join(root, OTHER)));
 
-    // Trailing spaces of the JSON chunk become a longer name: another file, the same shape.
+    // Another name in the JSON chunk makes another file with the same shape.
     const glb = (await readFile(join(root, CHANGED))).toString("latin1");
     const changed = Buffer.from(glb.replace('"Balls"', '"Bills"'), "latin1");
     expect(changed.equals(Buffer.from(glb, "latin1"))).toBe(false);
@@ -197,7 +197,7 @@ describeInChromium("without a network", () => {
       await expect.poll(() => keptFiles(viewer.page)).toContain(sha256(changed));
       expect(await keptFiles(viewer.page)).not.toContain(old);
 
-      gate.shut(); // the new one is the one that is kept
+      gate.shut(); // the new file is kept
       await open("");
       expect((await viewer.snapshot()).state.notices).toEqual([]);
     } finally {
@@ -207,7 +207,7 @@ describeInChromium("without a network", () => {
     }
   });
 
-  it("a file that is not as in files.json is not kept", async () => {
+  it("a file that differs from files.json is not kept", async () => {
     const body = (await readFile(join(root, CHANGED))).toString("latin1");
     const wrong = Buffer.from(body.replace('"Balls"', '"Bulls"'), "latin1");
     host.overrides.set(FOLDER + CHANGED, { status: 200, body: wrong });
@@ -228,7 +228,7 @@ describeInChromium("without a network", () => {
     });
     await open("&mode=off");
     await expect.poll(() => viewer.page.evaluate(offlineState)).toBe("refused");
-    await open("&mode=off"); // now through the worker
+    await open("&mode=off"); // the worker now serves the page
     await viewer.drawVolume("Block", true);
     await viewer.chooseMode("all");
     const { state, volumes } = await viewer.snapshot();
@@ -244,7 +244,7 @@ describeInChromium("without a network", () => {
     const workers = () =>
       other.evaluate(async () => (await navigator.serviceWorker.getRegistrations()).length);
     await other.goto(`${host.address}${FOLDER}?bundle=${gate.address}${FOLDER}`);
-    await other.locator("[data-fatal]").textContent(); // that host forbids other pages to read it
+    await other.locator("[data-fatal]").textContent(); // that host does not let other pages read its files
     expect(await workers()).toBe(0);
   });
 

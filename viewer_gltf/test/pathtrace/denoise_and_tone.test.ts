@@ -1,4 +1,4 @@
-/** What comes after the light: the picture's every pixel, worked out of what was gathered. */
+/** Compares each pixel of the finished frame with the value that follows from the gathered sums. */
 import { expect, it } from "vitest";
 import type { TraceSettings } from "../../src/state/path_trace_settings";
 import { prepareBarePage } from "../support/browser/bare_page";
@@ -7,10 +7,10 @@ import { sweep } from "../support/exhaustive";
 import type { Gathered, Harness, Run } from "../support/pathtrace/harness";
 import { BASE } from "../support/pathtrace/phantom";
 
-/** So many that nothing is denoised any more. */
+/** Number of samples from which no pixel is denoised. */
 const PASSES = 192;
 const RUN: Run = { ...BASE, color: [0.9, 0.55, 0.3], passes: PASSES, pixels: 20 };
-/** Of 255: the mean is kept in half floats, the picture in bytes. */
+/** Largest difference, of 255; the mean is stored in half-precision floats, and the frame in bytes. */
 const SLACK = 1.5;
 
 type Rgb = [number, number, number];
@@ -20,7 +20,7 @@ const clamp = (v: number) => Math.min(1, Math.max(0, v));
 const srgb = (v: number) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055);
 const film = (v: number) => clamp((v * (2.51 * v + 0.03)) / (v * (2.43 * v + 0.59) + 0.14));
 
-/** Hue in degrees, saturation and lightness changed as CSS has them (css-color-4, section 7). */
+/** Changes hue (degrees), saturation and lightness by the definitions of CSS (css-color-4, section 7). */
 function changed(rgb: Rgb, turn_deg: number, factor: number, lighter: number): Rgb {
   const [high, low] = [Math.max(...rgb), Math.min(...rgb)];
   const [r, g, b] = rgb;
@@ -42,7 +42,7 @@ function changed(rgb: Rgb, turn_deg: number, factor: number, lighter: number): R
   return [at(0), at(8), at(4)];
 }
 
-/** The picture, 0..255, premultiplied. */
+/** Returns the expected frame, 0..255, premultiplied. */
 function expectedOf({ sums, moments }: Gathered, s: TraceSettings, n = RUN.pixels): number[] {
   const mean = (x: number, y: number): readonly [Rgb, number] => {
     const i = 4 * (n * y + x);
@@ -140,14 +140,14 @@ describeInChromium("what comes after the light", () => {
     },
   );
 
-  it("is nothing at all where it is off, and changes nothing of the light", async () => {
+  it("has no effect if it is off, and never changes the gathered light", async () => {
     const off = await gather({ ...ALL, isPostOn: false });
     const plain = await gather(PLAIN);
     expect(off.picture).toEqual(plain.picture);
     expect(off.sums).toEqual(plain.sums);
   });
 
-  it("takes noise off the picture of a few samples", async () => {
+  it("removes noise from a frame with few samples", async () => {
     const pixels = 48;
     const { picture: many } = await gather(PLAIN, { pixels, passes: 256 });
     const apart = (picture: readonly number[]) =>

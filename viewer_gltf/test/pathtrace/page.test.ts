@@ -1,6 +1,6 @@
 /**
- * The page in its path-traced mode: it opens so for a scan of a whole body, gathers at rest, begins
- * anew with what paths depend on, and with nothing else.
+ * The page in the mode of path tracing. It opens in this mode for a scan of a whole body, gathers samples at rest, and
+ * restarts only after changes on which paths depend.
  */
 import { expect, it } from "vitest";
 import type { Manifest } from "../../src/bundle/generated/bundle";
@@ -27,22 +27,22 @@ type FilePayload = { name: string; mimeType: string; buffer: Buffer };
 
 const [F, BALL] = BODIES;
 const STUDIO = "/app/environments/studio.hdr";
-/** Small: software follows the light. */
+/** Size of the page, CSS pixels; small because paths are traced in software. */
 const VIEWPORT = { width: 168, height: 104 };
 const PATIENT = { timeout: 120_000 };
 const bounds = SPECIMEN as unknown as Manifest["specimen"]["bounds_um"];
 
-/** A picture of light, 4 x 2, all of one colour: Radiance's format, not packed. */
+/** An environment map of 4 x 2 texels of one colour, in Radiance's format without compression. */
 function hdr(red: number, green: number, blue: number): Buffer {
   const head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n";
   const texel = [red, green, blue].map((v) => Math.round(128 * v));
   return Buffer.concat([
     Buffer.from(head, "ascii"),
-    Buffer.from(Array.from({ length: 8 }, () => [...texel, 129]).flat()), // of 2
+    Buffer.from(Array.from({ length: 8 }, () => [...texel, 129]).flat()), // exponent for values up to 2
   ]);
 }
 
-/** How much two pictures differ, in the mean of all that either shows; of 255. */
+/** Mean difference of two pictures over all pixels that either one shows, of 255. */
 function apart(a: Picture, b: Picture): number {
   const shown = a.where((pixel) => !isBackground(pixel));
   const sum = shown.reduce(
@@ -52,7 +52,7 @@ function apart(a: Picture, b: Picture): number {
   return sum / 3 / shown.length;
 }
 
-/** The mean of all pixels of a kind, 0 to 255. */
+/** Mean colour of all pixels of a kind, 0 to 255. */
 function meanColor(picture: Picture, isOfKind: (pixel: Pixel) => boolean): readonly number[] {
   const shown = picture.where(isOfKind);
   return [0, 1, 2].map(
@@ -60,7 +60,7 @@ function meanColor(picture: Picture, isOfKind: (pixel: Pixel) => boolean): reado
   );
 }
 
-/** The same of all that lies within the outlines, which take more of a coarser or noisier picture. */
+/** Mean colour within the outlines, which are wider in a coarser or noisier picture. */
 function meanWithin(picture: Picture): readonly number[] {
   const { width, height } = picture;
   const isDrawn = (x: number, y: number) =>
@@ -85,9 +85,9 @@ describeInChromium("the path-traced page", () => {
   const samples = async () => (await snapshot()).traced.samples;
   const drawn = (picture: Picture) => picture.count((pixel) => !isBackground(pixel));
 
-  /** Paths that are scattered once: that is quicker, and most tests are of other things. */
+  /** Part of a link for paths that scatter only once, which is faster and sufficient for most tests. */
   const ONCE = "light=many:false";
-  /** As a scan of a whole body, by the bundle's own entry. */
+  /** Opens the bundle as a scan of a whole body, by a field of its manifest. */
   async function open(query = `&quality=low#v=1&${ONCE}`): Promise<void> {
     const { manifest } = stand;
     const scan = { ...manifest, specimen: { ...manifest.specimen, modality: "MR" } };
@@ -113,7 +113,7 @@ describeInChromium("the path-traced page", () => {
     }
   }
 
-  /** Of as many pixels as can be: the first pictures have fewer, and wider outlines. */
+  /** Takes a picture at full resolution; the first pictures have a lower one, and wider outlines. */
   async function shootClear(): Promise<Picture> {
     let picture = await shoot(10);
     for (;;) {
@@ -123,7 +123,7 @@ describeInChromium("the path-traced page", () => {
     }
   }
 
-  it("shows a scan, gathers, and changes only what a key or a slider is for", async () => {
+  it("shows a scan, gathers samples, and changes only the property of each key and slider", async () => {
     await open();
     expect((await snapshot()).state.mode).toBe("traced");
     expect(stand.host.requests.filter(({ path }) => path.endsWith(".glb"))).toEqual([]);
@@ -133,7 +133,7 @@ describeInChromium("the path-traced page", () => {
     const late = await shoot((await samples()) + 10);
     expect(apart(early, late)).toBeLessThan(12);
 
-    // before and after: at once, of the same samples
+    // Settings that apply after tracing show at once, with the same samples.
     const clear = await shootClear();
     const before = await samples();
     await press("Z");
@@ -143,26 +143,26 @@ describeInChromium("the path-traced page", () => {
     await press("Z");
     await expect.poll(async () => (await trace()).isPostOn).toBe(true);
     const again = await shoot(10);
-    // in the mean of all, where noise is no more, but for outlines: those are wider while it is
+    // Means over many pixels contain hardly any noise. Outlines are left out, since they are wider in a noisy picture.
     const off = (picture: Picture) =>
       Math.hypot(...between(meanWithin(picture), meanWithin(clear)));
     expect(off(plain)).toBeGreaterThan(6);
     expect(off(again)).toBeLessThan(off(plain) / 2);
 
-    // a lamp elsewhere
+    // A lamp moves to another place.
     const keys = LIGHT_NUMBERS.findIndex(({ link }) => link === "lamp-0/x") + 1;
     await press(...new Array<string>(keys).fill("F"));
     const many = await samples();
-    await press(...new Array<string>(20).fill("]")); // each a sixtieth of the way
+    await press(...new Array<string>(20).fill("]")); // each press moves it by a sixtieth of its range
     await expect.poll(async () => (await trace()).lamps[0].x).toBeCloseTo(1.1, 4);
     expect(await samples()).toBeLessThan(many);
     const lit = await shoot();
-    // against the picture before it; what one side gains the other loses: the mean of all won't do
+    // Pixels are compared one by one, since one side gains the light that the other loses, and the mean stays.
     const ofF = (picture: Picture) => meanColor(picture, hasColor(F.color));
     expect(apart(again, lit)).toBeGreaterThan(8);
     expect(Math.hypot(...between(ofF(lit), ofF(again)))).toBeGreaterThan(6);
 
-    // a channel that is hidden, and one of another colour
+    // A channel is hidden, and another one changes its colour.
     await press("2");
     await stand.viewer.settled();
     const alone = await shoot();
@@ -171,7 +171,7 @@ describeInChromium("the path-traced page", () => {
     await stand.viewer.recolor(F.id, "#00ff00");
     expect((await shoot()).count(hasColor([0, 1, 0]))).toBeGreaterThan(34);
 
-    // out of the mode and back
+    // The mode is left and entered again.
     await press("G");
     await stand.viewer.settled();
     expect((await snapshot()).state.mode).toBe("all");
@@ -182,7 +182,7 @@ describeInChromium("the path-traced page", () => {
     await gathered(4);
     expect(await notices()).toEqual([]);
 
-    // a link brings all of it back
+    // A link restores all settings.
     await press("Z", "I", "M");
     const address = await stand.viewer.writeLink();
     const wanted = await trace();
@@ -194,7 +194,7 @@ describeInChromium("the path-traced page", () => {
     expect(await notices()).toEqual([]);
   });
 
-  it("is cut open, and measured", async () => {
+  it("can be cut open and measured", async () => {
     await open(`&quality=low#v=1&mode=traced&dwell=off&${ONCE}`);
     const whole = await shoot(4);
     const right = (picture: Picture, from: number) => {
@@ -209,11 +209,11 @@ describeInChromium("the path-traced page", () => {
     expect(right(whole, edge) / (width * height)).toBeGreaterThan(25 / (240 * 150));
     await page().goto("about:blank");
     await open(`&quality=low#v=1&mode=traced&dwell=off&cut=1,0,0,34&${ONCE}`);
-    const cut = await shoot(6); // by now nothing is marched
+    const cut = await shoot(6); // with so many samples the ray-marched frame is not used
     expect(right(cut, edge)).toBe(0);
     expect(drawn(cut)).toBeGreaterThan(280);
 
-    await press("n", "p"); // whole again; a tap measures
+    await press("n", "p"); // the cut is removed, and a tap measures
     await stand.viewer.settled();
     const [ball] = BALLS;
     const { x, y } = at([...ball.center]);
@@ -228,10 +228,10 @@ describeInChromium("the path-traced page", () => {
     expect(point[2]).toBeGreaterThan(ball.center[2]);
   });
 
-  it("lets a lamp be dragged round the specimen, and no camera by it", async () => {
+  it("has a lamp that can be dragged around the specimen while the camera stays", async () => {
     const { scale, center } = place(bounds);
     const edge_m = 64 * scale;
-    /** Of the page: a point in edges from the middle, seen by an eye before it. */
+    /** Returns the page's pixel of a point, given in longest edges from the centre, for an eye in front of it. */
     async function pixelOf([x, y, z]: readonly number[], eye_m: number) {
       const box = await page().locator(".stage").boundingBox();
       if (box === null) throw new Error("no stage");
@@ -270,13 +270,13 @@ describeInChromium("the path-traced page", () => {
     expect(isBallAt(right, end)).toBe(false);
     expect(apart(left, right)).toBeGreaterThan(8);
 
-    // a lamp beside the eye comes into sight
+    // A lamp beside the eye becomes visible.
     await press("r", "$");
     const eye_m = Number((await eyeOf()).split(",")[2]);
     expect(isBallAt(await shoot(1), await pixelOf([x, y, z], eye_m))).toBe(true);
   });
 
-  it("is lit by a file of the user's, and survives a lost context", async () => {
+  it("is lit by a file of the user, and survives a lost context", async () => {
     await rememberContext(page());
     let chosen: FilePayload = { name: "", mimeType: "", buffer: Buffer.alloc(0) };
     page().on("filechooser", (chooser) => chooser.setFiles(chosen));
@@ -288,7 +288,7 @@ describeInChromium("the path-traced page", () => {
     await light("broken.hdr", Buffer.from("no picture of light"));
     await expect.poll(notices, PATIENT).toEqual([expect.stringMatching(/^broken\.hdr: expected/)]);
     expect((await trace()).environment).toBe("studio");
-    await press("Delete", "!"); // its notice, and the lamp
+    await press("Delete", "!"); // closes its notice, and switches the lamp
     expect((await trace()).lamps[0].isOn).toBe(false);
     await light("green.hdr", hdr(0, 1, 0));
     await expect.poll(async () => (await trace()).environment, PATIENT).toBe("own");
@@ -306,8 +306,8 @@ describeInChromium("the path-traced page", () => {
     await expect.poll(notices).toEqual([]);
     await stand.viewer.settled();
     const back = await shoot();
-    // of all pixels together: each by itself is noisy after a few samples, and a busy machine's
-    // picture is coarser, so that its outlines take more of it
+    // All pixels are counted together, since single pixels are noisy after a few samples. A busy machine draws a
+    // coarser picture with wider outlines.
     expect(Math.abs(drawn(back) / drawn(green) - 1)).toBeLessThan(0.25);
     expect(others(back)).toBeLessThan(0.03 * drawn(back));
     const [was, is] = [green, back].map(meanWithin);
@@ -320,7 +320,7 @@ describeInChromium("the path-traced page", () => {
       stand.host.overrides.set(STUDIO, { status: 503, body: "" });
       await open();
       await expect.poll(notices, PATIENT).toHaveLength(1);
-      await press("2", "1", "2"); // what changes the state does not ask again
+      await press("2", "1", "2"); // other changes of the state do not request it again
       await stand.viewer.settled();
       expect(await notices()).toHaveLength(1);
       stand.host.overrides.delete(STUDIO);
@@ -336,7 +336,7 @@ describeInChromium("the path-traced page", () => {
     await expect
       .poll(notices, PATIENT)
       .toEqual([expect.stringContaining("path tracing could not be loaded")]);
-    await press("2", "1", "2"); // what changes the state does not ask again
+    await press("2", "1", "2"); // other changes of the state do not request the code again
     await stand.viewer.settled();
     expect(await notices()).toHaveLength(1);
     await page().unroute(/\/path_tracer-[^/]*\.js$/);
@@ -345,8 +345,8 @@ describeInChromium("the path-traced page", () => {
     expect(drawn(await shoot(2))).toBeGreaterThan(340);
   });
 
-  it("is drawn to both eyes, and gathers while the head rests", async () => {
-    const { width, height } = { width: 72, height: 90 }; // of an eye
+  it("is drawn for both eyes, and gathers samples while the head rests", async () => {
+    const { width, height } = { width: 72, height: 90 }; // pixels of each eye
     await page().setViewportSize({ width: 2 * width, height });
     await addHeadset(page(), true);
     await open(`#v=1&mode=traced&dwell=off&quality=low&${ONCE}`);
@@ -362,13 +362,13 @@ describeInChromium("the path-traced page", () => {
       const { x, y, z } = headset.position;
       let k = 0;
       const trembling = window.setInterval(() => {
-        k++; // a millimetre to all sides
+        k++; // the head moves by a millimetre in all directions
         headset.position.set(x + 1e-3 * Math.sin(k), y + 1e-3 * Math.cos(2 * k), z);
       }, 5);
       Object.assign(window, { trembling });
     });
     const resting = await samples();
-    await gathered(resting + 3); // nothing is lost
+    await gathered(resting + 3); // no sample is lost
     const before = await samples();
     await page().evaluate(() => {
       const { headset, trembling } = window as unknown as {
@@ -376,7 +376,7 @@ describeInChromium("the path-traced page", () => {
         trembling: number;
       };
       window.clearInterval(trembling);
-      headset.position.set(0.3, 1.7, 0.1); // a real step
+      headset.position.set(0.3, 1.7, 0.1); // a step, which is more than trembling
     });
     await expect.poll(samples, PATIENT).toBeLessThan(before);
     await gathered(4);

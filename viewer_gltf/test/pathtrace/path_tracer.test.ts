@@ -1,8 +1,8 @@
 /**
- * The path tracer against what is known: a medium that swallows nothing vanishes in a white room,
- * light fades as Beer and Lambert have it, and another path tracer, tests/support/reference_path_tracer.py,
- * gathers the same. Whatever the bricks' size, and however the samples are spread. What comes after
- * the light is in denoise_and_tone.test.ts.
+ * Compares the path tracer with known results, for all sizes of bricks and all distributions of samples. A medium
+ * without absorption vanishes in a white room, light fades by the law of Beer and Lambert, and another path tracer,
+ * tests/support/reference_path_tracer.py, gathers the same light. Adjustments after tracing are tested in
+ * denoise_and_tone.test.ts.
  */
 import { describe, expect, it } from "vitest";
 import { SKIP_BRICK } from "../../src/bundle/generated/constants";
@@ -13,13 +13,13 @@ import type { Gathered, Harness, Run } from "../support/pathtrace/harness";
 import { BASE, opacityRamp, SIZE } from "../support/pathtrace/phantom";
 import { askPython, hasPython } from "../support/python";
 
-/** Texels of the tracer that rest or are sampled as one. */
+/** Edge of a tile, pixels; a tile is sampled as a whole or skipped. */
 const NOISE_TILE = 16;
 
 /** Edges of the bricks of majorants, texels. */
 const BRICKS = [SKIP_BRICK, 2 * SKIP_BRICK, 4 * SKIP_BRICK];
 
-/** Of the reference: its standard errors are below 1 % then. */
+/** Number of paths of the reference, with which its standard errors are below 1 %. */
 const PATHS = 600_000;
 
 const luminanceOf = ([r, g, b]: readonly number[]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
@@ -27,7 +27,7 @@ const mean = (values: readonly number[]) => values.reduce((a, b) => a + b, 0) / 
 
 type Estimate = Readonly<{ mean: number; error: number }>;
 
-/** Of the whole picture's luminance, with its standard error: by each pixel's own variance. */
+/** Returns the mean luminance of the frame, and its standard error from the variance of each pixel. */
 function brightness({ sums, moments }: Gathered): Estimate {
   const pixels = sums.length / 4;
   let [sum, variance] = [0, 0];
@@ -40,7 +40,7 @@ function brightness({ sums, moments }: Gathered): Estimate {
   return { mean: sum / pixels, error: Math.sqrt(variance) / pixels };
 }
 
-/** Of the whole picture's coverage. */
+/** Returns the mean coverage of the frame, and its standard error. */
 function coverage({ sums, moments }: Gathered): Estimate {
   const pixels = sums.length / 4;
   let [sum, variance] = [0, 0];
@@ -71,7 +71,7 @@ describeInChromium("the path tracer", () => {
   );
   const gather = (run: Run) => call("gather", run);
 
-  /** The same medium in other forms. */
+  /** Other forms in which the same medium can be given. */
   const TOLD = [
     ["by value and gradient", { isTwoD: true }],
     ["in bricks", { isBricked: true }],
@@ -89,14 +89,14 @@ describeInChromium("the path tracer", () => {
     swallowsNothing,
     ([, { surface }, told]) => surface === 0.7 || "isTwoD" in told,
   )) {
-    it(`lets a medium that swallows nothing vanish in a white room: ${name}`, async () => {
+    it(`makes a medium without absorption vanish in a white room: ${name}`, async () => {
       const passes = Object.keys(told).length > 0 ? 96 : 256;
       const pixels = 20;
       const { sums } = await gather({ ...BASE, ...told, settings, passes, pixels });
       const found: number[] = [];
       for (let i = 0; i < sums.length; i += 4) {
         if (sums[i + 3] < 0.2 * passes) continue;
-        const behind = passes - sums[i + 3]; // white, too
+        const behind = passes - sums[i + 3]; // the background is white, too
         found.push(mean(sums.slice(i, i + 3).map((v) => (v + behind) / passes)));
       }
       expect(found.length).toBeGreaterThan(80);
@@ -104,7 +104,7 @@ describeInChromium("the path tracer", () => {
     });
   }
 
-  it("lets it vanish in a picture that moves, too: paths that are cut short meet the room", async () => {
+  it("also makes it vanish while the view moves, since the environment replaces the rest of short paths", async () => {
     const dense: Run = { ...BASE, opacities: opacityRamp(250), isDraft: true };
     const { sums } = await gather({ ...dense, settings: { surface: 0 }, passes: 64 });
     const found: number[] = [];
@@ -119,12 +119,12 @@ describeInChromium("the path tracer", () => {
     const far: Run = {
       ...BASE,
       spacing_um: [1, 1, 1],
-      // far away: all rays go straight through, along z
+      // The eye is far away, so that all rays are parallel to z.
       camera: { eye: [16, -16, 64_000], target: [16, -16, 16], fov_deg: 0.02 },
       settings: { isMultiple: false },
     };
     const AXIS = Array.from({ length: SIZE[2] }, (_, i) => i);
-    /** Of intensities along z; the first and the last are apron. */
+    /** Texels of a slab from its intensities along z; the first and the last one are the apron. */
     const slab = (intensities: readonly number[]) =>
       intensities.flatMap((value) => new Array<number>(SIZE[0] * SIZE[1]).fill(value));
 
@@ -135,18 +135,18 @@ describeInChromium("the path tracer", () => {
       expect(Math.abs(1 - met - expected) / error).toBeLessThan(3);
     };
 
-    it("that is the same all through", async () => {
+    it("that is homogeneous", async () => {
       const opacity = 20;
       const opacities = new Array<number>(256).fill(opacity);
       const texels = slab(AXIS.map(() => 255));
-      const expected = (1 - opacity / 255) ** 32; // 32 um of voxels of 1 um
+      const expected = (1 - opacity / 255) ** 32; // 32 voxels of 1 um
       isAsExpected(await gather({ ...far, texels, opacities }), expected);
     });
 
     for (const [name, told] of sweep(TOLD, ([, told]) => !("isTwoD" in told))) {
       it(`given ${name}`, async () => {
         const { channels = 1 }: Partial<Run> = told;
-        const opacity = 20; // of one channel; as 8-bit tables hold it, alike channels' shares
+        const opacity = 20; // opacity of one channel, 8 bits; equal channels share it
         const share = Math.round(255 * (1 - (1 - opacity / 255) ** (1 / channels)));
         const opacities = new Array<number>(256).fill(opacity);
         const texels = slab(AXIS.map(() => 255));
@@ -155,7 +155,7 @@ describeInChromium("the path tracer", () => {
       });
     }
 
-    // steep, and in waves: bricks of every size have majorants of their own
+    // The intensities are steep and wavy, so that bricks of each size have different majorants.
     const intensities = AXIS.map((k) =>
       Math.round((k / 34) ** 2 * 115 * (1.2 + Math.sin(1.1 * k))),
     );
@@ -172,7 +172,7 @@ describeInChromium("the path tracer", () => {
       depth += (between(extinctions, between(intensities, z)) * 32) / STEPS;
     }
     for (const brick of sweep(BRICKS, (each) => each === BRICKS[0])) {
-      it(`that thickens inwards, bricks of ${brick}`, async () => {
+      it(`that becomes denser inwards, with bricks of ${brick}`, async () => {
         const texels = slab(intensities);
         const run = { ...far, texels, opacities, brick, passes: 128 };
         isAsExpected(await gather(run), Math.exp(-depth));
@@ -180,7 +180,7 @@ describeInChromium("the path tracer", () => {
     }
   });
 
-  it("lights even matter at the face of a cut as a matt wall of its colour", async () => {
+  it("lights the cut face of a homogeneous medium like a matt surface of its colour", async () => {
     const color = [0.6, 0.6, 0.6] as const;
     const { sums } = await gather({
       ...BASE,
@@ -194,7 +194,7 @@ describeInChromium("the path tracer", () => {
     expect(Math.abs(light - 0.6)).toBeLessThan(0.02);
   });
 
-  it("covers as much whatever the bricks' size", async () => {
+  it("gives the same coverage for all sizes of bricks", async () => {
     const [small, ...larger] = sweep(BRICKS, (brick) => brick !== 2 * SKIP_BRICK);
     const found = coverage(await gather({ ...BASE, brick: small }));
     for (const brick of larger) {
@@ -203,11 +203,11 @@ describeInChromium("the path tracer", () => {
     }
   });
 
-  it("takes turns with the tiles: after a whole turn each pixel has one sample", async () => {
+  it("samples tiles in turn, so that each pixel has one sample after a round", async () => {
     const run: Run = { ...BASE, pixels: 64 };
     const half = await gather({ ...run, share: 1 / 4, passes: 2 });
     expect(new Set(samplesOf(half))).toEqual(new Set([0, 1]));
-    expect(half.picture.every((v) => v === 0)).toBe(true); // nothing is shown in halves
+    expect(half.picture.every((v) => v === 0)).toBe(true); // half of a round is not shown
     for (const [share, passes] of [
       [1 / 4, 4],
       [1 / 16, 16],
@@ -219,7 +219,7 @@ describeInChromium("the path tracer", () => {
     }
   });
 
-  describe("spreads its samples", () => {
+  describe("distributes its samples", () => {
     const passes = 64;
     const run: Run = { ...BASE, pixels: 80, passes, color: [0.9, 0.7, 0.5] };
 
@@ -237,7 +237,7 @@ describeInChromium("the path tracer", () => {
       }));
     }
 
-    it("by the noise of the tiles, and the mean stays", async () => {
+    it("by the noise of the tiles, without changing the mean", async () => {
       const even = await gather(run);
       const adaptive = await gather({ ...run, calm: 0.02 });
       expect(tiles(even).every(({ samples }) => samples === passes)).toBe(true);
@@ -245,7 +245,7 @@ describeInChromium("the path tracer", () => {
       const empty = found.filter(({ isEmpty }) => isEmpty);
       const drawn = found.filter(({ isEmpty }) => !isEmpty);
       expect(empty.length).toBeGreaterThan(3);
-      // after two looks at the noise, an eighth of the frames
+      // After two measurements of the noise, calm tiles are sampled in an eighth of the passes.
       expect(mean(empty.map(({ samples }) => samples))).toBeLessThan(16 + 0.25 * (passes - 16));
       expect(Math.max(...drawn.map(({ samples }) => samples))).toBeGreaterThan(0.9 * passes);
       expect(mean(drawn.map(({ samples }) => samples))).toBeGreaterThan(
@@ -256,11 +256,11 @@ describeInChromium("the path tracer", () => {
     });
   });
 
-  describe("carries along what it has gathered", () => {
-    // a pixel shows .8 um of the middle; eyes may tremble by .53 um
+  describe("carries gathered samples to the moved view", () => {
+    // A pixel shows 0.8 um at the centre, and eyes may tremble by 0.53 um.
     const still: Run = { ...BASE, color: [0.9, 0.7, 0.5], pixels: 48, passes: 64 };
 
-    it("while the eye trembles: nothing is lost", async () => {
+    it("while the eye trembles, without losing any", async () => {
       const tremble = [
         [0, 0, 0],
         [-0.2, 0.3, 0.05],
@@ -274,12 +274,12 @@ describeInChromium("the path tracer", () => {
       expect(trembling.picture).not.toEqual(fresh.picture);
     });
 
-    it("and shows each point where the eye sees it by now, once between pixels", async () => {
-      // a slanted disc in front of nothing: its colour grows with x and y, its brim is a circle
+    it("and shows each point where the moved eye sees it, also between pixels", async () => {
+      // A slanted disc is in front of an empty background. Its colour grows with x and y, and its rim is a circle.
       const [pixels, fov_deg, radius] = [64, 24, 14];
       const unit = 2 * Math.tan((fov_deg * Math.PI) / 360);
       type Eye = [number, number, number];
-      /** Where the disc's plane, z = x / 3, is met; and how far away. */
+      /** Returns the place at which a pixel's ray meets the disc's plane, z = x / 3, and its distance. */
       const meet = ([ex, ey, ez]: Eye, i: number) => {
         const across = [i % pixels, Math.floor(i / pixels)].map(
           (k) => unit * ((k + 0.5) / pixels - 0.5),
@@ -325,7 +325,7 @@ describeInChromium("the path tracer", () => {
       }
     });
 
-    it.runIf(IS_EXHAUSTIVE)("while it sways slowly, up to a limit", async () => {
+    it.runIf(IS_EXHAUSTIVE)("while the eye sways slowly, up to a limit", async () => {
       const sway = Array.from({ length: 64 }, (_, i) => [0.1 * Math.min(i, 63 - i), 0, 0]);
       const fresh = await gather(still);
       const swayed = await gather({ ...still, asides: sway });
@@ -336,21 +336,21 @@ describeInChromium("the path tracer", () => {
       const counts = met(fresh, 0.5).map((i) => swayed.moments[4 * i + 1]);
       expect(counts.length).toBeGreaterThan(100);
       expect(mean(counts)).toBeGreaterThan(16);
-      // 48 of them, and its own from the last place on
+      // At most 48 samples are carried over, and those of the last place are added.
       expect(Math.max(...counts)).toBeLessThan(56);
-      // what is seen stays the same: neighbours share samples, which are as many in all
+      // The mean stays the same. Neighbouring pixels share samples, so the error is estimated for 32 samples.
       const few = {
         ...fresh,
         moments: fresh.moments.map((v) => v / 2),
         sums: fresh.sums.map((v) => v / 2),
       };
       for (const estimate of [brightness, coverage]) {
-        const { error } = estimate(few); // of 32 samples
+        const { error } = estimate(few); // for 32 samples
         expectAlike({ mean: estimate(swayed).mean, error }, estimate(fresh), estimate.name);
       }
     });
 
-    it("but begins anew where the eye really moves", async () => {
+    it("but restarts if the eye really moves", async () => {
       const asides = [...new Array<number[]>(15).fill([0, 0, 0]), [5, 0, 0]];
       const moved = await gather({ ...still, passes: 16, asides });
       expect(new Set(samplesOf(moved))).toEqual(new Set([1]));
@@ -358,8 +358,8 @@ describeInChromium("the path tracer", () => {
     });
   });
 
-  it("finds a pit's ground less open than a face", async () => {
-    // dense up to z = 54, with a pit 3 wide and 24 deep in its middle; seen from above
+  it("finds the bottom of a pit less open than a face", async () => {
+    // The medium is dense up to z = 54, with a pit 3 wide and 24 deep at its centre, seen from above.
     const [n, depth, top] = [23, 67, 54];
     const texels = Array.from({ length: n * n * depth }, (_, i) => {
       const [x, y, z] = [i % n, Math.floor(i / n) % n, Math.floor(i / n ** 2)];
@@ -374,7 +374,7 @@ describeInChromium("the path tracer", () => {
       opacities: opacityRamp(250),
       color: [0.8, 0.8, 0.8],
       settings: { surface: 1, shine: 0 },
-      // 16 um of the middle
+      // The view shows 16 um at the centre.
       camera: { eye: [10, -10, 6000], target: [10, -10, 20], fov_deg: 0.153 },
     });
     const openness = (isThere: (away_um: number) => boolean) => {

@@ -1,6 +1,7 @@
 /**
- * A path-traced picture looks the same while the view moves, when a marched picture stands in, and at rest: for
- * five settings of every number of the light. STEREOCELL_MOVING_TABLE names a file for the table of differences.
+ * A path-traced frame looks the same at rest and while the view moves, when a ray-marched frame stands in for it. This
+ * is checked for five values of every number of the light. STEREOCELL_MOVING_TABLE names a file for the table of
+ * differences.
  */
 import { writeFile } from "node:fs/promises";
 import { afterAll, expect, it } from "vitest";
@@ -17,13 +18,13 @@ import type { Harness, Pair, View } from "../support/pathtrace/stand_in";
 
 /** Largest difference of the mean colours, CIEDE2000. */
 const MAX_DELTA_E = 6;
-/** Of the page behind the specimen. */
+/** Colour of the page behind the specimen. */
 const BACKGROUND: Pixel = [11, 13, 18];
 
-/** Pixels along the edge of a block that is looked at as a whole. */
+/** Edge of a block of pixels whose mean is compared. */
 const BLOCK = 4;
 
-/** Bright above, dim below, with a window on one side. */
+/** An environment that is bright above and dim below, with a window on one side. */
 const ROOM = {
   width: 4,
   height: 2,
@@ -46,7 +47,7 @@ function viewOf({ view }: Specimen, settings: Partial<TraceSettings>, pixels = 1
   return { ...BASE, environment: ROOM, passes: 64, pixels, ...view, settings };
 }
 
-/** A pixel over the background: encoded, as the page shows it. */
+/** Returns a pixel over the background, sRGB-encoded like on the page. */
 function overBackground(rgba: readonly number[]): Pixel {
   const linear = (v: number) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
   const encoded = (v: number) => (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055);
@@ -104,7 +105,7 @@ describeInChromium("while the view moves the stand-in", () => {
   async function differenceOf(name: string, view: View): Promise<number> {
     const pair = await call("pair", view);
     const specimen = meansOf(pair, true);
-    if (!hasPixels(specimen)) return 0; // nothing is left of it, moving or at rest
+    if (!hasPixels(specimen)) return 0; // neither frame shows anything of the specimen
     const [moving, resting] = specimen.map(toLab);
     const found = colorDifference(moving, resting);
     const sky = meansOf(pair, false);
@@ -124,13 +125,13 @@ describeInChromium("while the view moves the stand-in", () => {
   });
 
   const isWhole = IS_EXHAUSTIVE || process.env.STEREOCELL_MOVING_TABLE !== undefined;
-  /** Of a slider's way. */
+  /** Places along a slider, 0..1. */
   const sharesOf = (row: number) => (isWhole ? [0, 0.25, 0.5, 0.75, 1] : [row % 2 ? 0.25 : 0.75]);
   const specimens = isWhole ? [GREEN, SKIN] : [GREEN];
   const traced = { ...START_LIGHT, mode: "traced" as const };
   const rows = LIGHT_NUMBERS.filter(({ id }) => !/lamp-[12]/.test(id));
   for (const [number, row] of rows.entries()) {
-    it(`looks as the picture at rest whatever the ${row.link} is`, async () => {
+    it(`looks like the frame at rest for any ${row.link}`, async () => {
       for (const specimen of specimens) {
         for (const share of sharesOf(number)) {
           const value = valueAtShare(row, share);
@@ -144,7 +145,7 @@ describeInChromium("while the view moves the stand-in", () => {
     });
   }
 
-  it("looks as the picture at rest whatever is cut away", async () => {
+  it("looks like the frame at rest for any cut", async () => {
     for (const specimen of specimens) {
       for (const right of isWhole ? [10, 14, 18, 22, 26] : [14]) {
         const view = { ...viewOf(specimen, START_TRACE), cut: [0, right] as const };
@@ -154,7 +155,7 @@ describeInChromium("while the view moves the stand-in", () => {
     }
   });
 
-  it("looks as the picture at rest with and without what comes after the light", async () => {
+  it("looks like the frame at rest with and without the adjustments after tracing", async () => {
     const lamps = START_TRACE.lamps.map((lamp) => ({ ...lamp, isOn: true }));
     const others: [string, Partial<TraceSettings>][] = [
       ["no tone map", { toneMap: "none" }],
@@ -180,7 +181,7 @@ describeInChromium("while the view moves the stand-in", () => {
     ["hue", { hue: 90 }],
   ];
   for (const [name, settings] of CHANGES) {
-    it(`shows another value of ${name} in the next frame, over the whole picture`, async () => {
+    it(`shows another value of ${name} in the whole next frame`, async () => {
       const view = { ...viewOf(SKIN, {}, MANY), passes: 32 };
       const { before, frames, after } = await call("change", view, settings);
       const blocks = blocksOf(before, MANY).flatMap((was, i) => {

@@ -1,13 +1,13 @@
-/** The page's address follows the view in headless Chromium: a reload brings the view back. */
+/** The page's address follows the view in headless Chromium, so that a reload restores the view. */
 import { expect, it } from "vitest";
 import type { Snapshot } from "../../src/host/snapshot";
 import { difference, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 
-/** Of the picture's pixels, beside those that blend differently from one drawing to the next. */
+/** Share of pixels that may differ, in addition to those that blend differently each time they are drawn. */
 const SAME = 0.002;
-/** Longer than the view has to be calm until the address follows, ms. */
+/** Wait, ms; longer than the view has to rest before the address follows. */
 const CALM_MS = 2500;
 
 describeInChromium("the address", () => {
@@ -30,14 +30,14 @@ describeInChromium("the address", () => {
     await stand.viewer.still();
   };
 
-  it("stays as it is until someone changes the view, and again at the opening view", async () => {
+  it("stays as it is until the view changes, and returns with the opening view", async () => {
     await stand.open("&mode=off");
     const opened = page().url();
     await calm();
     expect(page().url()).toBe(opened);
     await page().keyboard.press("ArrowRight");
     await expect.poll(hash).toContain("&eye=");
-    await page().keyboard.press("z"); // the front, with which the page has opened
+    await page().keyboard.press("z"); // the front view, with which the page has opened
     await expect.poll(() => page().url()).toBe(opened);
   });
 
@@ -76,7 +76,7 @@ describeInChromium("the address", () => {
     expect(page().url()).toBe(`${stand.host.address}/bundle/manifest.json`);
   });
 
-  it("leaves the words that a reader has typed out, and a reload keeps them", async () => {
+  it("leaves out text that a user has typed, and a reload keeps that text", async () => {
     await stand.open("&mode=off#v=1&measures=d:Distance%201:1,-1,1,5,-1,1");
     await stand.viewer.settled();
     await stand.viewer.unfold("measure");
@@ -95,7 +95,7 @@ describeInChromium("the address", () => {
     expect(await names()).toEqual(["Doe, Jane"]);
   });
 
-  it("gives way to a link that is pasted over it", async () => {
+  it("is replaced by a link that is pasted over it", async () => {
     await stand.open("&mode=off");
     await page().keyboard.press("ArrowRight");
     await expect.poll(hash).toContain("&eye=");
@@ -110,7 +110,7 @@ describeInChromium("the address", () => {
     expect(await hash()).toBe("#v=1&disc=33");
   });
 
-  it("stays as it is in the split screen, also while the page waits for the phone to be turned", async () => {
+  it("stays as it is in the split screen, also while the page waits for the phone's rotation", async () => {
     await stand.open("&mode=off");
     await page().setViewportSize({ width: 270, height: 480 });
     await page().evaluate(() => Object.assign(window, { isSamePage: true }));
@@ -125,7 +125,7 @@ describeInChromium("the address", () => {
     expect(await page().evaluate(() => "isSamePage" in window)).toBe(true);
   });
 
-  it("stays as it is in a frame without a panel, unless it is asked to follow", async () => {
+  it("stays as it is in a frame without a panel, unless the address requests that it follows", async () => {
     const turnIn = async (query: string) => {
       await page().setContent(
         `<iframe width="400" height="240" src="${stand.host.address}/app/?bundle=../bundle/&quality=low&mode=off${query}"></iframe>`,

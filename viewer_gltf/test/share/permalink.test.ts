@@ -8,9 +8,9 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 
 const F = "F_x20_body";
-/** Of the picture's pixels, beside those that blend differently from one drawing to the next. */
+/** Share of pixels that may differ, in addition to those that blend differently each time they are drawn. */
 const SAME = 0.002;
-/** In a headset frames are drawn in their budget, some coarser than others. */
+/** The same share in a headset, where frames are drawn within a time limit, and some are coarser. */
 const SAME_IN_HEADSET = 0.008;
 
 describeInChromium("the share link", () => {
@@ -18,13 +18,13 @@ describeInChromium("the share link", () => {
   const page = () => stand.viewer.page;
   const said = () => page().locator("[data-said]").textContent();
 
-  /** What a view is made of; notices and the order of showing are not. */
+  /** Returns the parts of a state that belong to a view; notices and the order of showing do not. */
   function viewOf({ state }: Snapshot) {
     const { notices, channels, ...rest } = state;
     return { ...rest, channels: channels.map(({ turn, ...channel }) => channel) };
   }
 
-  it("brings back state and picture in another page", async () => {
+  it("restores state and picture in another page", async () => {
     await stand.open("&mode=tile&disc=20");
     const { viewer } = stand;
     await viewer.settled();
@@ -41,7 +41,7 @@ describeInChromium("the share link", () => {
     await viewer.still();
     const [before, picture] = [viewOf(await viewer.snapshot()), await takePicture(page())];
     expect(address).toContain("#v=1&");
-    // A setting of the address is part of the view by now.
+    // A setting of the address is now part of the link's view.
     expect(new URL(address).search).toBe("?bundle=..%2Fbundle%2F");
     expect(address).toContain("&disc=20&");
     expect(await page().locator('[data-control="link"]').inputValue()).toBe(address);
@@ -65,9 +65,9 @@ describeInChromium("the share link", () => {
       const parts = new URLSearchParams(link.slice(1));
       return ["eye", "pose"].flatMap((name) => parts.get(name)?.split(",").map(Number) ?? []);
     };
-    /** What is announced before the eyes has gone. */
+    /** Waits until announcements in front of the eyes have disappeared. */
     const silent = () => expect.poll(told).toEqual([]);
-    /** The name of what is looked at has come. */
+    /** Waits until the name of the part under the gaze is shown. */
     const rested = () => page().waitForTimeout(1500);
     const told = async () => (await stand.viewer.snapshot()).told;
     const expectSame = (found: readonly number[], wanted: readonly number[]) => {
@@ -83,7 +83,7 @@ describeInChromium("the share link", () => {
     await stand.viewer.enterStereo();
     await silent();
     const unmoved = await takePicture(page());
-    expectSame(await written(), flat); // nobody has moved it there
+    expectSame(await written(), flat); // the specimen was not moved in the headset
     await press("ArrowRight", "+");
     await silent();
     await rested();
@@ -92,14 +92,14 @@ describeInChromium("the share link", () => {
     const moved = await written();
     expect(moved).toHaveLength(flat.length + 8);
     expect(moved.slice(0, 6)).toEqual(flat.slice(0, 6));
-    // nearer by a fifth of a headset's 1.1 m, and not by that metre itself
+    // The specimen is nearer by a fifth of the 1.1 m in a headset, and not by the 1.1 m themselves.
     expect(Math.hypot(...moved.slice(6, 9))).toBeLessThan(0.2 + 0.2 * 1.1);
     const address = page().url();
 
     await press("V");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
     await stand.viewer.still();
-    expectSame(await written(), moved); // what was done there stays
+    expectSame(await written(), moved); // changes that were made in the headset stay
     await silent();
     const left = await takePicture(page());
 
@@ -124,7 +124,7 @@ describeInChromium("the share link", () => {
     expect(copied).toContain(`disc=${START_VOLUMES.discRadius_deg - 1}`);
   });
 
-  it("is selected in a field where the browser refuses the clipboard", async () => {
+  it("is selected in a field if the browser refuses access to the clipboard", async () => {
     await page().addInitScript(() => {
       Object.defineProperty(navigator, "clipboard", { value: undefined });
     });
@@ -134,7 +134,7 @@ describeInChromium("the share link", () => {
     expect(await page().evaluate(() => getSelection()?.toString())).toBe(page().url());
   });
 
-  it("shows what it can of a link to another bundle, and reports what is missing", async () => {
+  it("applies the known parts of a link to another bundle, and reports the missing ones", async () => {
     await stand.open("#v=1&c=Balls,CD8&tile=r7_c7&disc=9&box=NaN");
     const { state } = await stand.viewer.snapshot();
     expect(state.channels.filter(({ shown }) => shown).map(({ id }) => id)).toEqual(["Balls"]);

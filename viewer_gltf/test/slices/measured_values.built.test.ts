@@ -1,6 +1,6 @@
 /**
- * Values as they were measured, from `stereocell serve OUT`: exact under the pointer, where the 8 bits
- * of a bundle alone round them. Skipped where the repository has no .venv (`make setup`).
+ * Measured values from `stereocell serve OUT`. They are exact under the pointer, while the 8 bits of a bundle alone are
+ * rounded. Skipped if the repository has no .venv (`make setup`).
  */
 import { existsSync } from "node:fs";
 import { cp, mkdtemp, rm, symlink } from "node:fs/promises";
@@ -20,7 +20,7 @@ const SHOTS = process.env.STEREOCELL_SHOTS;
 const QUERY = "?mode=off#v=1&slices=on&slice-x=0.31&slice-y=0.4&slice-z=0.6";
 const stage = DEMO_BUNDLE === undefined ? "" : join(dirname(DEMO_BUNDLE), "stage");
 
-/** The values of each slice: a span a channel; what stands between them is drawn. */
+/** The values of each slice, one span per channel; the style draws the separators. */
 const valuesOf = (page: Page) =>
   page
     .locator(".slices .values")
@@ -67,11 +67,11 @@ describe.skipIf(!existsSync(STEREOCELL) || !existsSync(stage))("values as measur
       return { page, asked, texts };
     }
 
-    /** What the texts name, channel by channel. */
+    /** The numbers in a text, channel by channel. */
     const numbers = (text: string) =>
       text.split(" · ").map((part) => Number(part.split(" ").at(-1)));
 
-    it("are the host's under the crosshair and under the pointer, and nearly those of 8 bits", async () => {
+    it("come from the host under the crosshair and the pointer, and are close to those of 8 bits", async () => {
       const files = await open(`${host.address}/${QUERY}`);
       const coarse = (await files.texts())[0];
       expect(files.asked).toEqual([]);
@@ -87,7 +87,7 @@ describe.skipIf(!existsSync(STEREOCELL) || !existsSync(stage))("values as measur
         .toEqual([0, 1, 2].map(() => expect.stringContaining(` ${exact[0]}`)));
       expect(numbers((await texts())[0])).toEqual(exact);
       exact.forEach((value, i) => {
-        // between voxels the 8 bits are interpolated
+        // The 8-bit values are interpolated between voxels.
         expect(Math.abs(value - numbers(coarse)[i])).toBeLessThan(0.25 * Math.max(400, value));
       });
 
@@ -102,7 +102,7 @@ describe.skipIf(!existsSync(STEREOCELL) || !existsSync(stage))("values as measur
       await page.close();
     });
 
-    it("are those of 8 bits where the host answers no more", async () => {
+    it("are those of 8 bits if the host no longer answers", async () => {
       const { page, asked, texts } = await open(`${host.address}/${QUERY}`);
       const coarse = await texts();
       await page.close();

@@ -1,4 +1,4 @@
-/** The three slices in the page: pictures, crosshair, keys, values, and planes in the specimen. */
+/** The three slices in the page: images, crosshair, keys, values, and quads in the specimen. */
 import { beforeAll, expect, it } from "vitest";
 import { project } from "../support/browser/camera";
 import { difference, takePicture } from "../support/browser/picture";
@@ -16,7 +16,7 @@ describeInChromium("slices", () => {
   const page = () => stand.viewer.page;
   const state = async () => (await stand.viewer.snapshot()).state;
   const plane = (i: number) => page().locator(`[data-slice="${i}"]`);
-  /** Share of a picture's pixels that aren't dark. */
+  /** Share of a slice's pixels that aren't dark. */
   const lit = (i: number) =>
     plane(i)
       .locator("canvas")
@@ -34,7 +34,7 @@ describeInChromium("slices", () => {
     await stand.viewer.settled();
   });
 
-  it("show all three, with axes at the edges and the values where they meet", async () => {
+  it("are shown all three, with axes at the edges and the values at their intersection", async () => {
     for (const i of [0, 1, 2]) expect(await lit(i), `${i}`).toBeGreaterThan(0.01);
     const ends = await plane(0).locator(".end").allTextContents();
     expect(ends).toEqual(["−x", "+x", "+y", "−y"]);
@@ -42,7 +42,7 @@ describeInChromium("slices", () => {
     if (SHOTS) await page().screenshot({ path: `${SHOTS}/slices.png` });
   });
 
-  it("move the crosshair by a click and by keys, and go back by one step each", async () => {
+  it("move the crosshair by a click and by keys, with one step to undo for each", async () => {
     const box = await plane(0).boundingBox();
     if (box === null) throw new Error("no picture");
     const before = await state();
@@ -69,7 +69,7 @@ describeInChromium("slices", () => {
     ]);
   });
 
-  it("turn by a drag with Shift, and widen the window by the right button", async () => {
+  it("rotate by a drag with Shift, and widen the window by a drag with the right button", async () => {
     const box = await plane(0).boundingBox();
     if (box === null) throw new Error("no picture");
     const at = (x: number, y: number) => [box.x + x * box.width, box.y + y * box.height] as const;
@@ -90,8 +90,8 @@ describeInChromium("slices", () => {
     expect(high - low).toBeCloseTo(0.7, 1);
   });
 
-  it("say all values, and keep letters clear of them and of one another, however little room", async () => {
-    await page().setViewportSize({ width: 560, height: 420 }); // 100 pixels each
+  it("show all values without overlapping letters, even in little space", async () => {
+    await page().setViewportSize({ width: 560, height: 420 }); // 100 pixels for each slice
     await plane(1).evaluate((each) => each.style.setProperty("--ratio", "8")); // thin ones
     const boxes = await page()
       .locator("figure")
@@ -129,7 +129,7 @@ describeInChromium("slices", () => {
     }
   });
 
-  it("stand in the specimen as planes", async () => {
+  it("show as quads in the specimen", async () => {
     await page().keyboard.press("\\");
     await stand.viewer.still();
     const without = await takePicture(page());
@@ -146,7 +146,7 @@ describeInChromium("planes in the specimen", () => {
   const stand = prepareStand({ viewport });
 
   for (const mode of sweep(["off", "all"], (each) => each === "all")) {
-    it(`are not hidden by what lies between them and the eye, volumes ${mode}`, async () => {
+    it(`are not hidden by parts between them and the eye, volumes ${mode}`, async () => {
       const { min, max } = stand.manifest.specimen.bounds_um;
       const at = async (cut: string) => {
         const slices = "&planes=on&slice-x=0.1&slice-y=0.1&slice-z=0.3";
@@ -154,7 +154,7 @@ describeInChromium("planes in the specimen", () => {
         await stand.viewer.settled();
         return takePicture(stand.viewer.page);
       };
-      const bare = await at(`&box=${[...max.map((v) => v - 1), ...max].join(",")}`); // nothing left
+      const bare = await at(`&box=${[...max.map((v) => v - 1), ...max].join(",")}`); // nothing of the specimen is left
       const whole = await at("");
       let [alike, lit] = [0, 0];
       for (let x = 0.2; x < 0.9; x += 0.02) {
@@ -172,7 +172,7 @@ describeInChromium("planes in the specimen", () => {
         }
       }
       expect(lit).toBeGreaterThan(50);
-      // what sticks out beside the corner is in front of some
+      // Parts that extend beyond the corner cover some pixels.
       expect(alike / 36 ** 2).toBeGreaterThan(0.9);
     });
   }
@@ -181,7 +181,7 @@ describeInChromium("planes in the specimen", () => {
 describeInChromium("planes whose voxels are on their way", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 320 } });
 
-  it("hide nothing until there is something to see", async () => {
+  it("hide no part of the specimen until they have loaded", async () => {
     const { page } = stand.viewer;
     let release = (): void => undefined;
     const gate = new Promise<void>((resolve) => {
@@ -195,7 +195,7 @@ describeInChromium("planes whose voxels are on their way", () => {
     await stand.viewer.settled();
     const without = await takePicture(page);
     await page.keyboard.press("|");
-    await expect.poll(() => page.locator(".slices").count()).toBe(1); // the code has come
+    await expect.poll(() => page.locator(".slices").count()).toBe(1); // the code has loaded
     await page.waitForTimeout(1000);
     expect(difference(await takePicture(page), without)).toBeLessThan(0.001);
     release();
@@ -208,7 +208,7 @@ describeInChromium("planes whose voxels are on their way", () => {
 describeInChromium("slices whose code does not come", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 320 } });
 
-  it("are asked for again, after a notice", async () => {
+  it("are requested again after a notice", async () => {
     const { page } = stand.viewer;
     const CODE = "**/assets/slices-*.js";
     await page.route(CODE, (route) => route.abort());
@@ -244,7 +244,7 @@ describeInChromium("slices of a CT", () => {
     const { page } = viewer;
     const texts = (part: string) => page.locator(`.slices ${part}`).allTextContents();
     expect(await texts("figcaption")).toEqual(["axial", "coronal", "sagittal"]);
-    // as a radiologist sees them: from the feet, from the front
+    // Slices have the radiological orientation: seen from the feet, and from the front.
     expect(await texts(".end")).toEqual([..."RLAPRLSIAPSI"]);
     for (const text of await texts(".values")) expect(text).toMatch(/-?\d+ HU/);
     await page.keyboard.press("e");

@@ -1,4 +1,4 @@
-/** The viewer without a bundle: a source at an address, or dropped on the page, is read by the page itself. */
+/** The viewer without a bundle: the page itself reads a source at an address, or one that is dropped on it. */
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -37,7 +37,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
     const notices = async () => (await stand.viewer.snapshot()).state.notices;
 
     async function faultOf(source: string): Promise<string> {
-      await stand.viewer.page.goto("about:blank"); // the same address would be no visit of its own
+      await stand.viewer.page.goto("about:blank"); // opening the same address again would not load the page
       await stand.viewer.page.goto(addressOf(source));
       const fatal = stand.viewer.page.locator("[data-fatal]");
       const text = (await fatal.textContent({ timeout: 20_000 })) ?? "";
@@ -45,7 +45,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       return text;
     }
 
-    /** Middle of the pixels of a hue, as shares of the picture. */
+    /** Centres of the pixels of each hue, as shares of the picture. */
     async function middles() {
       const picture = await takePicture(stand.viewer.page);
       const middleOf = (places: [number, number][]) => {
@@ -57,7 +57,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       return { red, green, atRed: middleOf(red), atGreen: middleOf(green), picture };
     }
 
-    it("shows OME-Zarr 0.4: each channel in its colour and place", async () => {
+    it("shows each channel of OME-Zarr 0.4 in its colour and place", async () => {
       other.headers = CORS;
       await open("v04.ome.zarr");
       await stand.viewer.settled();
@@ -69,21 +69,21 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       ]);
       expect(volumes.length).toBeGreaterThan(0);
       const { red, green, atRed, atGreen, picture } = await middles();
-      // boxes of 16 x 14 and 16 x 14 um in a field of 28 x 20 um: a part of the picture, not all
+      // The boxes of 16 x 14 um in a field of 28 x 20 um cover only a part of the picture.
       const share = (pixels: readonly unknown[]) =>
         pixels.length / (picture.width * picture.height);
       for (const pixels of [red, green]) {
         expect(share(pixels)).toBeGreaterThan(0.01);
         expect(share(pixels)).toBeLessThan(0.25);
       }
-      expect(atRed[0]).toBeLessThan(0.47); // on the left, below
+      expect(atRed[0]).toBeLessThan(0.47); // at the lower left
       expect(atRed[1]).toBeGreaterThan(0.53);
-      expect(atGreen[0]).toBeGreaterThan(0.53); // on the right, above
+      expect(atGreen[0]).toBeGreaterThan(0.53); // at the upper right
       expect(atGreen[1]).toBeLessThan(0.47);
       expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     });
 
-    it("has slices and links as a bundle has", async () => {
+    it("has slices and links like a bundle", async () => {
       other.headers = CORS;
       await stand.viewer.open(`${addressOf(`${other.address}/v04.ome.zarr`)}&slices=on`);
       await stand.viewer.settled();
@@ -101,7 +101,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       expect(state.channels.map(({ shown }) => shown)).toEqual([true, false]);
       expect(state.notices).toEqual([T_NOTE]);
       const drawn = await middles();
-      expect(drawn.red.length).toBeGreaterThan(100); // the slices leave it a part of the page
+      expect(drawn.red.length).toBeGreaterThan(100); // the 3D view is only a part of the page beside slices
       expect(drawn.green.length).toBe(0);
     });
 
@@ -113,18 +113,18 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       const { red, green } = await middles();
       expect(Math.min(red.length, green.length)).toBeGreaterThan(500);
       const data = other.requests.filter(({ path }) => !path.endsWith(".json"));
-      // parts of shards and of archives; whole chunks otherwise
+      // Shards and archives are read in parts, and other chunks whole.
       expect(data.some(({ range }) => range !== null)).toBe(name.startsWith("sharded"));
     });
 
-    it("reads what lies on its own host, by an address relative to the page", async () => {
+    it("reads a source on its own host by an address relative to the page", async () => {
       const page = await Host.start({ "/app/": DIST, "/": folder });
       await stand.viewer.open(`${page.address}/app/?source=../v05.ome.zarr&quality=low`);
       expect(await notices()).toEqual([T_NOTE]);
       await page.stop();
     });
 
-    it("reaches the host of the source, and no third one", async () => {
+    it("contacts only its own host and the host of the source", async () => {
       other.headers = CORS;
       const third = await Host.start({ "/": folder });
       third.headers = CORS;
@@ -148,7 +148,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       expect(asked).toBeNull();
     });
 
-    describe("says who has to do what, where", () => {
+    describe("names the remedy if", () => {
       it("the host allows no other page", async () => {
         const text = await faultOf(`${other.address}/v04.ome.zarr`);
         const { origin } = new URL(stand.host.address);
@@ -193,7 +193,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         expect(await faultOf(`${other.address}/nothing.ozx`)).toMatch(/not found|let other pages/);
       });
 
-      it("the host can't be reached, or the address is none", async () => {
+      it("the host can't be reached, or the address is invalid", async () => {
         expect(await faultOf("http://127.0.0.1:9/x.zarr")).toContain("can't be reached");
         const { page } = stand.viewer;
         await page.goto(`${stand.host.address}/app/?source=file%3A%2F%2F%2Fetc%2Fpasswd`);
@@ -218,7 +218,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       }
     });
 
-    describe("takes a source of this device", () => {
+    describe("opens a source of this device", () => {
       const start = async () => {
         await stand.viewer.page.goto(
           `${stand.host.address}/app/?view=front&quality=low#v=1&depth=0`,
@@ -237,7 +237,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       const asked = () =>
         stand.host.requests.filter(({ path }) => !/^\/app\/(assets|environments)\//.test(path));
 
-      it("a NIfTI file that is dropped, of which nothing leaves it", async () => {
+      it("from a dropped NIfTI file, and sends none of its data", async () => {
         const bytes = [...(await readFile(join(folder, "head.nii.gz")))];
         await start();
         await stand.viewer.page.evaluate((content) => {
@@ -252,7 +252,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         expect(asked()).toEqual([]);
       });
 
-      it("a folder of OME-Zarr that is dropped, then others on its picture", async () => {
+      it("from a dropped folder of OME-Zarr, and others that are dropped on the view", async () => {
         await start();
         const { page } = stand.viewer;
         const devtools = await page.context().newCDPSession(page);
@@ -277,7 +277,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         expect(await names()).toEqual(["NIfTI"]);
       });
 
-      it("a folder of OME-Zarr that is chosen", async () => {
+      it("from a chosen folder of OME-Zarr", async () => {
         await start();
         const field = stand.viewer.page.locator('[data-choose="folder"]');
         await field.setInputFiles(join(folder, "v04.ome.zarr"));
@@ -286,7 +286,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         expect(asked()).toEqual([]);
       });
 
-      it("another one, after a file that is none", async () => {
+      it("after a file that could not be read", async () => {
         await writeFile(join(folder, "notes.txt"), "no image");
         await start();
         const field = stand.viewer.page.locator('[data-choose="file"]');

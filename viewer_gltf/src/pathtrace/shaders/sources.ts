@@ -1,4 +1,4 @@
-/** The text of the path tracer's shaders: apart, as not everybody needs them. */
+/** The source of the path tracer's shaders, in its own file because not all users need it. */
 
 import { CHUNKS } from "../../gpu/glsl_chunks";
 import { includeChunks } from "../../gpu/glsl_include";

@@ -1,6 +1,6 @@
 import { unpackBlosc } from "../unpack_blosc";
 
-/** Takes the place of `numcodecs/blosc`: see vite.config.ts. */
+/** Replaces `numcodecs/blosc` (see vite.config.ts). */
 export default class Blosc {
   static readonly codecId = "blosc";
 

@@ -3,7 +3,7 @@ import { unpackLz4 } from "../unpack";
 /** Largest chunk that is unpacked, bytes. */
 const MAX_BYTES = 1 << 30;
 
-/** Takes the place of `numcodecs/lz4`: see vite.config.ts. A block of LZ4 stands behind its unpacked size. */
+/** Replaces `numcodecs/lz4` (see vite.config.ts). A chunk is its unpacked size, followed by a block of LZ4. */
 export default class Lz4 {
   static readonly codecId = "lz4";
 

@@ -2,7 +2,7 @@ import { ZSTDDecoder } from "zstddec/stream";
 
 const decoder = new ZSTDDecoder();
 
-/** Takes the place of `numcodecs/zstd`: see vite.config.ts. */
+/** Replaces `numcodecs/zstd` (see vite.config.ts). */
 export default class Zstd {
   static readonly codecId = "zstd";
 
@@ -12,7 +12,7 @@ export default class Zstd {
 
   async decode(packed: Uint8Array): Promise<Uint8Array> {
     await decoder.init();
-    // a frame need not state its size: then it is unpacked part by part
+    // A frame need not state its unpacked size; the streaming decoder then unpacks it part by part.
     return decoder.decode(packed);
   }
 }
