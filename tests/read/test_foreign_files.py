@@ -99,7 +99,7 @@ def test_the_header_that_the_message_suggests_reads_raw_voxels(
         (tmp_path / sidecar).write_text("[representation]\nsize = 10 9 6\n")
     line = refusal(tmp_path / "scan.raw")
     assert (f"described by {sidecar!r}" if sidecar else "if it is a volume") in line
-    advised = line.partition("with the lines ")[2].rpartition("); expected")[0].split(", ")
+    advised = line.partition("with the lines ")[2].rpartition("), expected")[0].split(", ")
     text = "\n".join(advised).replace("DimSize = X Y Z", "DimSize = 10 9 6")
     text = text.replace("ElementSpacing = X Y Z (mm)", "ElementSpacing = 0.5 0.5 2")
     (tmp_path / "scan.mhd").write_text(text + "\n")

@@ -38,7 +38,7 @@ def test_wrong_arguments_raise_an_error_of_one_line(tmp_path: Path) -> None:
     assert "\n" not in str(raised.value)
     with pytest.raises(stereocell.StereoCellError, match="grids"):
         stereocell.build(tmp_path / "f.tif", tmp_path / "out", settings={"plan": {"grids": "2x1"}})
-    with pytest.raises(stereocell.StereoCellError, match="workers is -1; expected"):
+    with pytest.raises(stereocell.StereoCellError, match="workers is -1, expected"):
         stereocell.build(tmp_path, tmp_path / "out", workers=-1)
     assert not (tmp_path / "out").exists()
 

@@ -46,7 +46,7 @@ def _check_appearance(id_: str, appearance: Any) -> dict[str, Any]:
         )
     checked: dict[str, Any] = {}
     for name, value in appearance.items():
-        where = f"channels: {name} of {id_} is {value!r:.60}; expected"
+        where = f"channels: {name} of {id_} is {value!r:.60}, expected"
         if name == "visible":
             if not isinstance(value, bool):
                 raise UsageError(f"{where} True or False")

@@ -141,7 +141,7 @@ def test_other_frames_of_nuclear_medicine_are_refused(
             "without a place in the patient (Secondary Capture Image",
         ),
         (UltrasoundMultiFrameImageStorage, 3, "no place for each (Ultrasound Multi-frame Image"),
-        ("1.2.3.4.5", 1, "without a place in the patient; expected"),
+        ("1.2.3.4.5", 1, "without a place in the patient, expected"),
     ],
 )
 def test_an_image_without_a_position_is_named_by_its_kind(
