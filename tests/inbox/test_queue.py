@@ -198,7 +198,7 @@ def test_a_reader_that_dies_or_hangs_is_one_line_and_the_server_goes_on(
         client.wait(item, "understanding", "understood")
         server.inbox.reader.stop(server.inbox.find(item))  # as a crash does
         state = client.wait(item, "failed", "understood")
-        assert state["doing"] == "understood" or "reading was ended" in state["line"]
+        assert state["doing"] == "understood" or "reading was stopped" in state["line"]
         with patch("stereocell.inbox.preparing.UNPACK_S", 0.0):
             archive = io.BytesIO()
             with zipfile.ZipFile(archive, "w") as packed:

@@ -109,7 +109,7 @@ def test_an_address_that_was_public_when_it_was_handed_in_fails_later(
     tmp_path: Path, inner: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The inner number stands for the answer that the process of the reader gets."""
-    monkeypatch.setattr(inbox_app, "_is_here", lambda _: False)  # from another machine
+    monkeypatch.setattr(inbox_app, "_is_on_this_machine", lambda _: False)  # from another machine
     monkeypatch.setattr(inbox_module, "check_address", lambda text, **_: text)
     (tmp_path / "served").mkdir()
     with serving_inbox(tmp_path / "served", is_near=False) as server:

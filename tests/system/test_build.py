@@ -351,11 +351,11 @@ def test_iso_value_must_be_finite(
     assert "expected a number" in _one_line(capsys)
 
 
-def test_readme_s_edit_layer_recolours_the_bundle(built: Path, tmp_path: Path) -> None:
+def test_the_layer_in_the_docs_recolours_the_bundle(built: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(built, out)
-    readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
-    layer = readme.split("```usda\n")[1].split("```")[0]
+    page = (Path(__file__).parents[2] / "docs" / "stage-layers.md").read_text("utf-8")
+    layer = page.split("```usda\n")[1].split("```")[0]
     layer = layer.replace("out/mine", str(out)).replace("CD31", "F_x20_body")
     (tmp_path / "edited.usda").write_text(layer)
     edited = ["--stage", str(tmp_path / "edited.usda")]
