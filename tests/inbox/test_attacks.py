@@ -72,7 +72,8 @@ def test_every_attack_is_refused_in_one_line_and_leaves_nothing(
     capfd: pytest.CaptureFixture[str],
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr(inbox_app, "_is_on_this_machine", lambda _: False)  # all come from other machines
+    # All requests appear to come from other machines.
+    monkeypatch.setattr(inbox_app, "_is_on_this_machine", lambda _: False)
     monkeypatch.setattr(socket, "getaddrinfo", look_up)
     packed = list(archives())
     with serving_inbox(tmp_path) as server:
