@@ -24,8 +24,8 @@ from support.long_files import LONG_FILES
 from support.object_store import VERSITYGW
 from support.small_viewer import write_small_viewer
 
-# Python's garbage collector finds no garbage while modules and tests are loaded, but takes a third
-# of the time. Loaded objects are later excluded from collection.
+# While modules and tests are loaded, Python's garbage collector finds nothing but takes a third of
+# the time. `pytest_collection_finish` turns it on and excludes the loaded objects.
 gc.disable()
 
 pytest_plugins = ["support.message_catalogue"]

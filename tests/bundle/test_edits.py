@@ -154,7 +154,7 @@ def test_points_edited_outside_the_variants_are_named_with_the_remedy(edit):
 
 
 def test_values_over_time_are_refused_and_named(edit):
-    """Other programs would show such values as a frame of an animation."""
+    """A program that plays animations would show such values as one frame."""
 
     def points(stage):
         mesh = stage.GetAttributeAtPath("/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0.points")

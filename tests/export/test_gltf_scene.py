@@ -1,4 +1,4 @@
-"""Other programs read a plain glTF, and the result agrees with the sphere that it shows."""
+"""A plain glTF is read by other programs, and agrees with the sphere that it shows."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""Other libraries find each voxel's value at its true place, also in oblique scans."""
+"""Each voxel's value is at its true place when other libraries read it, also in oblique scans."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a case is, and functions that damage files: a seed gives the same bytes each time."""
+"""Define a case of malformed input, and functions that damage files in the same way each time."""
 
 import json
 import random

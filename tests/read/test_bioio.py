@@ -1,4 +1,4 @@
-"""Other formats through bioio. A stand-in is installed here, since bioio is not a dependency."""
+"""Formats that bioio reads. A stand-in is installed here, since bioio is not a dependency."""
 
 import sys
 from pathlib import Path

@@ -22,10 +22,10 @@ NEARLY = 0.8
 NEARLY_SEPARATION, NEARLY_STEEPNESS = 0.66, 0.85
 # Share of all voxels; a clear level with less inside may show specks of what the outer level holds
 FEW_INSIDE = 0.01
-# Least contrast over noise, least steepness and largest sharpness of a level that is certainly one
-# of edges, such as that of bodies much dimmer than others. A step that is blurred by a Gaussian of
-# one voxel has a sharpness of 1 / sqrt(2 pi), and an edge is no sharper. A sharper level lies on
-# the flank of something brighter.
+# Bounds beyond which a level certainly lies on edges: least contrast over noise, least steepness,
+# largest sharpness. They keep levels of components that are much dimmer than others. A step that is
+# blurred by a Gaussian of one voxel has a sharpness of 1 / sqrt(2 pi), and no edge is sharper. A
+# sharper level lies on the flank of something brighter.
 EDGE_SNR, EDGE_STEEPNESS, EDGE_SHARPNESS = 6.0, 1.5, 0.4
 # Ratio of contrasts, of bodies in a valley to a level around them, from which that level may be a
 # haze. Stain in the cytoplasm of a confocal nucleus has a 52nd of the nucleus' contrast. In the

@@ -24,11 +24,11 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.volume import zyx_to_xyz
 
-# Number of turns of smoothing, tuned on a ball of 8 um in voxels of 1 x .5 x .5 um. The last slices
-# of a ball end in flat plates, many voxels wide, which a weaker filter (40 turns of .5 and -.53)
-# keeps. It left errors of up to 17 degrees in the normals of 95 % of the area, and of .067 um on
-# average in the position. With the present values these are 8 degrees and .041 um. Still more turns
-# round boxes into pillows.
+# Number of turns of smoothing, tuned on a ball of 8 um in voxels of 1 x .5 x .5 um. The ball's last
+# slices are flat plates, many voxels wide, and a weaker filter (40 turns of .5 and -.53) keeps them.
+# With that filter, normals are off by up to 17 degrees over 95 % of the area, and positions by .067
+# um on average. With the present values these errors are 8 degrees and .041 um. Still more turns
+# would round boxes into pillows.
 SMOOTHINGS = 70
 _INWARD, _OUTWARD = 0.64, -0.65  # shares of the way to the mean of the neighbours, alternately
 _ROUNDS = 12  # largest number of rounds in which vertices are put back

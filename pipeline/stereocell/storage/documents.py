@@ -130,7 +130,7 @@ def _validator(schema: str) -> "Draft202012Validator":
     name, _, definition = schema.partition("#")
     text = schema_path(name).read_text("utf-8")
     content = json.loads(text)
-    # other schemas are put among the definitions, where a reference finds them by their `$id`
+    # A reference finds another schema by its `$id`, if that schema is among the definitions.
     others = {other: schema_path(f"{other}.schema.json") for other in _OTHERS.findall(text)}
     own = {other: json.loads(file.read_bytes()) for other, file in others.items()}
     content["$defs"] = {**content.get("$defs", {}), **own}

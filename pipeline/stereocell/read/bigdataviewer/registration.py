@@ -57,8 +57,7 @@ def decompose(matrix: Matrix) -> Parts | None:
     shear = math.degrees(math.asin(min(float(np.abs(cosines).max()), 1.0)))
     best = max(permutations(range(3)), key=lambda p: sum(abs(unit[i, p[i]]) for i in range(3)))
     signs = [unit[world, stored] < 0 for world, stored in enumerate(best)]
-    # World axes x, y, z are needed in the order z, y, x. Stored axis k of (x, y, z) is axis 2 - k
-    # of (z, y, x).
+    # World axes x, y, z are needed in the order z, y, x, where stored axis k becomes axis 2 - k.
     z, y, x = (2 - best[world] for world in (2, 1, 0))
     turn = Turn((z, y, x), (bool(signs[2]), bool(signs[1]), bool(signs[0])))
     nearest = np.zeros((3, 3))
