@@ -1,4 +1,4 @@
-"""Define a case of malformed input, and functions that damage files in the same way each time."""
+"""Cases of malformed input, and functions that damage files in the same way each time."""
 
 import json
 import random
