@@ -63,7 +63,7 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
         type=_named,
         help="path of a volume: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of "
         "planes (TIFF, PNG, JPEG, BMP), Imaris, HDF5 (FILE.h5:/KEY), netCDF, MATLAB 7.3, NRRD, "
-        "MRC, MGH, CZI and others (docs/own-data.md); or an http(s):// or s3:// address of "
+        "MRC, MGH, CZI and others (docs/input-formats.md); or an http(s):// or s3:// address of "
         "OME-Zarr, TIFF or N5",
     )
     declare_how_to_read(parser)
@@ -379,7 +379,7 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=300,
         metavar="S",
-        help="longest time that the network may take for one patch, in s (default %(default)s)",
+        help="longest time for loading the network, and for each patch, in s (default %(default)s)",
     )
     parser.add_argument(
         "--model-memory-gb",

@@ -54,7 +54,7 @@ class ObjectOptions:
         flag=Flag(
             "--table-key",
             "the table's column with the objects' numbers (default: the first of CellID, label, "
-            "cell_id, instance_id, object_id that exists)",
+            "cell_id, instance_id, object_id, ObjectNumber, id that exists)",
             "COLUMN",
         ),
     )
