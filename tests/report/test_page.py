@@ -428,7 +428,7 @@ def test_channels_without_a_clear_surface_have_remarks(built: Path) -> None:
     assert titles == {
         "1 channel without a surface": ("dim: no clear surface: nothing stands out",),
         "1 channel with an unsure surface": ("CD31: unsure surface: it is noisy",),
-        "1 tile without a surface of a channel that has one elsewhere": (
+        "1 pair of tile and channel without a surface, of channels that have one elsewhere": (
             "r0_c0/CD31: no voxel crosses the iso-value",
         ),
         "1,200 fragments removed": ("CD31: 1,200 in 1 tile, most in r0_c0 (1,200)",),
@@ -438,7 +438,7 @@ def test_channels_without_a_clear_surface_have_remarks(built: Path) -> None:
 
 def test_opening_says_what_was_built_how_sure_it_is_and_where_to_look(built: Path) -> None:
     facts = gather(OutFolder(built))
-    opening = find_opening(facts, find_covers(facts.units), ())
+    opening = find_opening(facts, find_covers(facts.units), (), ["twin"])
     name = facts.plan.name
     assert opening.built == (
         f"StereoCell built volumes of 3 channels and surfaces of 2 of them from {name}, in 2 tiles."
@@ -453,7 +453,7 @@ def test_opening_names_unsure_surfaces_and_leads_to_other_iso_values(built: Path
     twin = facts.survey["twin"]
     unsure = replace(twin, appearance=replace(twin.appearance, surface="unsure"))
     facts = replace(facts, survey={**facts.survey, "twin": unsure})
-    opening = find_opening(facts, find_covers(facts.units), ())
+    opening = find_opening(facts, find_covers(facts.units), (), ["twin"])
     assert opening.certainty == "1 of 1 surface is unsure: twin."
     assert opening.look_first == (
         "Look first at the other iso-values of twin, which may fit better."
@@ -464,7 +464,7 @@ def test_opening_names_unsure_surfaces_and_leads_to_other_iso_values(built: Path
 def test_opening_leads_to_a_surface_that_leaves_out_voxels(built: Path) -> None:
     facts = gather(OutFolder(built))
     covers = {"twin": SurfaceCover(Cover(1000, 600, 700), 0)}
-    opening = find_opening(facts, covers, ())
+    opening = find_opening(facts, covers, (), ["twin"])
     assert opening.look_first == (
         "Look first at the slices of twin, whose surface leaves out 40% of the voxels above its "
         "iso-value."
@@ -488,7 +488,7 @@ def test_thin_triangles_at_the_finest_level_have_a_note(built: Path) -> None:
     (remark,) = find_remarks(replace(facts, units=units))
     assert remark.is_note
     assert remark.title.startswith("1 channel with thin triangles at the finest level")
-    assert remark.lines == ("CD31: 9.5° in r0_c2, and 2 tiles in all",)
+    assert remark.lines == ("CD31: 9.5° in r0_c2; 2 tiles have such triangles",)
     assert not find_remarks(replace(facts, units=units[:1]))
 
 

@@ -1,5 +1,6 @@
 """The three sentences that open the report: what was built, how sure it is, where to look first."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from stereocell.building.surface_cover import SurfaceCover
@@ -23,13 +24,17 @@ class Opening:
 
 
 def find_opening(
-    facts: Facts, covers: dict[str, SurfaceCover], labels: tuple[LabelFacts, ...]
+    facts: Facts,
+    covers: dict[str, SurfaceCover],
+    labels: tuple[LabelFacts, ...],
+    with_others: Collection[str],
 ) -> Opening:
     """Return the opening of a build's report.
 
-    covers  by the name of each channel with a surface
+    covers       by the name of each channel with a surface
+    with_others  names of the channels for which the page shows other iso-values
     """
-    look_first, anchor = _look_first(facts, covers)
+    look_first, anchor = _look_first(facts, covers, with_others)
     return Opening(_built(facts, labels), _certainty(facts), look_first, anchor)
 
 
@@ -61,9 +66,9 @@ def _certainty(facts: Facts) -> str:
     if not found:
         has_given = any(look.level is not None for look in looks.values())
         return (
-            "All iso-values were given, so no confidence was computed."
+            "The iso-values of all surfaces were given, so no confidence was computed."
             if has_given
-            else "No channel has a clear iso-value, so there is no surface."
+            else "No channel has a surface; the sections below give the reasons."
         )
     unsure = [name for name, look in found.items() if look.surface == "unsure"]
     if unsure:
@@ -77,10 +82,12 @@ def _certainty(facts: Facts) -> str:
     return f"All surfaces are clear. {least} is the least sure, with a confidence of {value} of 1."
 
 
-def _look_first(facts: Facts, covers: dict[str, SurfaceCover]) -> tuple[str, str]:
+def _look_first(
+    facts: Facts, covers: dict[str, SurfaceCover], with_others: Collection[str]
+) -> tuple[str, str]:
     looks = {channel: facts.survey[channel.id].appearance for channel in facts.plan.channels}
     for channel, look in looks.items():
-        if look.surface == "unsure":
+        if look.surface == "unsure" and channel.name in with_others:
             return (
                 f"Look first at the other iso-values of {channel.name}, which may fit better.",
                 "wrong",
@@ -100,7 +107,9 @@ def _look_first(facts: Facts, covers: dict[str, SurfaceCover]) -> tuple[str, str
     near = [
         channel.name
         for channel in looks
-        if facts.survey[channel.id].near_levels and given_level(facts.plan, channel) is None
+        if channel.name in with_others
+        and facts.survey[channel.id].near_levels
+        and given_level(facts.plan, channel) is None
     ]
     if near:
         return (

@@ -72,7 +72,8 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
     labels = gather_labels(out_folder, plan)
-    covers = find_covers(facts.units)
+    covers, rows = find_covers(facts.units), _channels(facts)
+    with_others = [row["name"] for row in rows if row["others"]]
     scenes = [_scene(facts, None, labels), *(_scene(facts, tile) for tile in tiles)]
     cards = [
         [
@@ -94,9 +95,9 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         whole_note=_drawn_note(facts.units, _WHOLE_TRIANGLES)
         if plan.channels
         else "Objects at their coarsest level of detail",
-        opening=find_opening(facts, covers, labels),
+        opening=find_opening(facts, covers, labels, with_others),
         remarks=find_remarks(facts),
-        channels=_channels(facts),
+        channels=rows,
         labels=[(one, css_color(one.color)) for one in labels],
         thresholds=_thresholds(facts),
         tiles=[

@@ -17,7 +17,7 @@ from stereocell.report.page import TEMPLATE, write_report
 class WriteReport(Keyed):
     """Write the report. The fields are all documents of OUT that it shows, and its template."""
 
-    VERSION: ClassVar[int] = 2
+    VERSION: ClassVar[int] = 3
 
     index: Mapping[str, str]
     survey: Mapping[str, Any]

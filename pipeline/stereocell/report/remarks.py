@@ -39,11 +39,14 @@ def find_remarks(facts: Facts) -> list[Remark]:
         _remark("without a surface", whole, "channel"),
         _remark("with an unsure surface", unsure, "channel"),
         _remark(
-            "without a surface of a channel that has one elsewhere", bare, "tile", is_note=True
+            "of tile and channel without a surface, of channels that have one elsewhere",
+            bare,
+            "pair",
+            is_note=True,
         ),
         _remark(
-            f"with thin triangles at the finest level (1 % of the angles are below "
-            f"{MIN_ANGLE_DEG:g}°)",
+            f"with thin triangles at the finest level (1 % of the triangles "
+            f"have an angle below {MIN_ANGLE_DEG:g}°)",
             _thin(units),
             "channel",
             is_note=True,
@@ -111,7 +114,7 @@ def _thin(units: Iterable[UnitFacts]) -> list[str]:
             thin.setdefault(unit.channel.name, []).append((angle, unit.tile.id))
     return [
         f"{channel}: {min(found)[0]:.1f}° in {min(found)[1]}"
-        + (f", and {len(found):,} tiles in all" if len(found) > 1 else "")
+        + (f"; {len(found):,} tiles have such triangles" if len(found) > 1 else "")
         for channel, found in thin.items()
     ]
 
