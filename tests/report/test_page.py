@@ -428,7 +428,7 @@ def test_channels_without_a_clear_surface_have_remarks(built: Path) -> None:
     assert titles == {
         "1 channel without a surface": ("dim: no clear surface: nothing stands out",),
         "1 channel with an unsure surface": ("CD31: unsure surface: it is noisy",),
-        "1 pair of tile and channel without a surface, of channels that have one elsewhere": (
+        "1 pair of tile and channel without a surface, though the channel has one in other tiles": (
             "r0_c0/CD31: no voxel crosses the iso-value",
         ),
         "1,200 fragments removed": ("CD31: 1,200 in 1 tile, most in r0_c0 (1,200)",),

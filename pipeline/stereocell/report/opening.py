@@ -66,7 +66,7 @@ def _certainty(facts: Facts) -> str:
     if not found:
         has_given = any(look.level is not None for look in looks.values())
         return (
-            "The iso-values of all surfaces were given, so no confidence was computed."
+            "The iso-values come from the settings or the preset, so no confidence was computed."
             if has_given
             else "No channel has a surface; the sections below give the reasons."
         )

@@ -39,7 +39,7 @@ def find_remarks(facts: Facts) -> list[Remark]:
         _remark("without a surface", whole, "channel"),
         _remark("with an unsure surface", unsure, "channel"),
         _remark(
-            "of tile and channel without a surface, of channels that have one elsewhere",
+            "of tile and channel without a surface, though the channel has one in other tiles",
             bare,
             "pair",
             is_note=True,
