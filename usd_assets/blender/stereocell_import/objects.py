@@ -180,7 +180,7 @@ class HideSelected(_OfObjects):
     """Hide the objects that have a selected face"""
 
     bl_idname = "stereocell.hide_selected"
-    bl_label = "Hide the selected"
+    bl_label = "Hide the selected objects"
 
     def execute(self, context):
         root = _root(context)
@@ -192,7 +192,7 @@ class ShowAll(_OfObjects):
     """Show all objects again"""
 
     bl_idname = "stereocell.show_all"
-    bl_label = "Show all"
+    bl_label = "Show all objects"
 
     def execute(self, context):
         root = _root(context)
@@ -206,7 +206,7 @@ class ColorSelected(_OfObjects):
     """Give the objects that have a selected face a colour of their own"""
 
     bl_idname = "stereocell.color_selected"
-    bl_label = "Colour the selected"
+    bl_label = "Colour the selected objects"
     color: FloatVectorProperty(
         name="Colour", subtype="COLOR", size=3, min=0, max=1, default=(0.8, 0.1, 0.1)
     )

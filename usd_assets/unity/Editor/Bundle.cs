@@ -86,7 +86,7 @@ namespace StereoCell.Editor
             if ((string)Member(manifest, "format") != "stereocell-bundle") throw new BundleException("manifest.json is of no StereoCell bundle");
             if ((int)Member(manifest, "version") != Version)
             {
-                throw new BundleException("manifest.json: expected version " + Version + ", found " + Member(manifest, "version") + ": take this package of the StereoCell that built it");
+                throw new BundleException("manifest.json: found version " + Member(manifest, "version") + ", expected " + Version + ": take this package of the StereoCell that built it");
             }
             var index = (JObject)Member(manifest, "files");
             files = Parse("files.json", Checked((string)Member(index, "path"), index));
@@ -125,7 +125,7 @@ namespace StereoCell.Editor
         byte[] Checked(string path, JObject entry)
         {
             var data = ReadFile(path);
-            if (data.Length != (long)entry["bytes"]) throw new BundleException(path + ": expected " + entry["bytes"] + " bytes, found " + data.Length);
+            if (data.Length != (long)entry["bytes"]) throw new BundleException(path + ": found " + data.Length + " bytes, expected " + entry["bytes"]);
             using (var sha256 = SHA256.Create())
             {
                 var found = BitConverter.ToString(sha256.ComputeHash(data)).Replace("-", "").ToLowerInvariant();

@@ -25,7 +25,7 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
     "p",
     {
       textContent:
-        "The specimen flies once round and towards you, in every mode and at every size of its volumes. " +
+        "The specimen flies once around and towards you, in every mode and at every size of its volumes. " +
         "Keep this page in front until the table is there.",
     },
     {},

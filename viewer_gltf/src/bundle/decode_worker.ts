@@ -22,7 +22,7 @@ function unzstd(frame: Uint8Array, bytes: number, part: number): Uint8Array {
     throw new PartFault(part, "the zstd stream is broken");
   }
   if (decoded.length === bytes) return decoded;
-  throw new PartFault(part, `expected ${bytes} texel bytes, found ${decoded.length}`);
+  throw new PartFault(part, `found ${decoded.length} texel bytes, expected ${bytes}`);
 }
 
 async function decode({ parts, bytes }: DecodeRequest): Promise<Uint8Array<ArrayBuffer>> {

@@ -116,10 +116,10 @@ export async function fetchPart(
   }
   const total = response.headers.get("Content-Range")?.split("/")[1];
   if (total !== undefined && total !== "*" && Number(total) !== file.bytes) {
-    throw new BundleError(`${path}: expected ${file.bytes} bytes, found ${total}`);
+    throw new BundleError(`${path}: found ${total} bytes, expected ${file.bytes}`);
   }
   if (bytes.length !== length) {
-    throw new BundleError(`${path}: expected ${length} bytes of a range, found ${bytes.length}`);
+    throw new BundleError(`${path}: found ${bytes.length} bytes of a range, expected ${length}`);
   }
   try {
     await checkHash(`${path}: ${name}`, bytes, part.sha256);
@@ -134,7 +134,7 @@ export async function fetchPart(
 export async function checkFile(file: FileRef, bytes: Uint8Array<ArrayBuffer>): Promise<void> {
   if (bytes.length !== file.bytes) {
     throw new BundleError(
-      `${file.path}: expected ${file.bytes} bytes, found ${bytes.length} (a broken upload?)`,
+      `${file.path}: found ${bytes.length} bytes, expected ${file.bytes} (a broken upload?)`,
     );
   }
   await checkHash(file.path, bytes, file.sha256);
@@ -152,6 +152,6 @@ export function parseJson(text: string, path: string): unknown {
       });
     }
     const start = text.trim().slice(0, 40).replace(/\s+/g, " ");
-    throw new BundleError(`${path}: expected JSON, found "${start}"`, { cause: error });
+    throw new BundleError(`${path}: found "${start}", expected JSON`, { cause: error });
   }
 }

@@ -35,13 +35,13 @@ export function readTexture(
   }
   if (texture.vkFormat !== FORMATS[format].vk) {
     throw new BundleError(
-      `${path}: vkFormat: expected ${FORMATS[format].vk} (${format}), found ${texture.vkFormat}`,
+      `${path}: vkFormat: found ${texture.vkFormat}, expected ${FORMATS[format].vk} (${format})`,
     );
   }
   const found = [texture.pixelWidth, texture.pixelHeight, texture.pixelDepth || 1];
   if (found.some((n, i) => n !== size[i])) {
     throw new BundleError(
-      `${path}: size: expected ${size.join(" x ")}, found ${found.join(" x ")}`,
+      `${path}: size: found ${found.join(" x ")}, expected ${size.join(" x ")}`,
     );
   }
   return texture;
@@ -57,7 +57,7 @@ export async function readLevel(
   const level = texture.levels[index];
   if (level === undefined) {
     throw new BundleError(
-      `${path}: expected mip level ${index}, found ${texture.levels.length} levels`,
+      `${path}: found ${texture.levels.length} levels, expected mip level ${index}`,
     );
   }
   const side = (n: number) => Math.max(1, n >> index);
@@ -72,13 +72,13 @@ export async function readLevel(
     case KHR_SUPERCOMPRESSION_NONE:
       if (level.levelData.length !== size) {
         throw new BundleError(
-          `${path}: level ${index}: expected ${size} bytes, found ${level.levelData.length}`,
+          `${path}: level ${index}: found ${level.levelData.length} bytes, expected ${size}`,
         );
       }
       return new Uint8Array(level.levelData);
     default:
       throw new BundleError(
-        `${path}: supercompression: expected zstd or none, found scheme ${texture.supercompressionScheme}`,
+        `${path}: supercompression: found scheme ${texture.supercompressionScheme}, expected zstd or none`,
       );
   }
 }
@@ -92,7 +92,7 @@ export function compressedLevel(
   const level = texture.levels[index];
   if (level === undefined) {
     throw new BundleError(
-      `${path}: expected mip level ${index}, found ${texture.levels.length} levels`,
+      `${path}: found ${texture.levels.length} levels, expected mip level ${index}`,
     );
   }
   return texture.supercompressionScheme === KHR_SUPERCOMPRESSION_ZSTD ? level.levelData : null;

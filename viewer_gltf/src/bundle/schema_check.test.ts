@@ -80,7 +80,7 @@ describe("other JSON", () => {
 
   it("is reported as such if it is a host's error page", () => {
     expect(() => parseJson("<!doctype html><title>Oops</title>", "manifest.json")).toThrow(
-      'manifest.json: expected JSON, found "<!doctype html>',
+      'manifest.json: found "<!doctype html>',
     );
   });
 

@@ -17,13 +17,13 @@ function glb(length: number, found: number): Uint8Array {
 describe("a surface's file", () => {
   it("has the length that its header states", () => {
     expect(() => checkGlb(glb(40, 40), PATH)).not.toThrow();
-    expect(() => checkGlb(glb(40, 28), PATH)).toThrow(`${PATH}: expected 40 bytes, found 28`);
+    expect(() => checkGlb(glb(40, 28), PATH)).toThrow(`${PATH}: found 28 bytes, expected 40`);
   });
 
   it("is not a host's error page", () => {
     const page = new TextEncoder().encode("<!doctype html><title>Oops</title>");
-    expect(() => checkGlb(page, PATH)).toThrow(`${PATH}: expected a glb surface`);
-    expect(() => checkGlb(new Uint8Array(), PATH)).toThrow(`${PATH}: expected a glb surface`);
+    expect(() => checkGlb(page, PATH)).toThrow(`${PATH}: found another kind of file, expected a glb surface`);
+    expect(() => checkGlb(new Uint8Array(), PATH)).toThrow(`${PATH}: found another kind of file, expected a glb surface`);
   });
 });
 
@@ -159,7 +159,7 @@ describe("the files of a tileset", () => {
     const { files } = serve({ "r0_c0/finer.json": Buffer.from("<!doctype html>") });
     await files.fetch(files.root);
     await expect(files.fetch(`${FOLDER}/r0_c0/finer.json`)).rejects.toThrow(
-      'channels/A/r0_c0/finer.json: expected JSON, found "<!doctype html>"',
+      'channels/A/r0_c0/finer.json: found "<!doctype html>", expected JSON',
     );
   });
 });

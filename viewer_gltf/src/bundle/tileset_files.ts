@@ -12,12 +12,12 @@ const MAGIC = 0x46546c67;
 export function checkGlb(bytes: Uint8Array, path: string): void {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   if (bytes.length < HEADER_BYTES || view.getUint32(0, true) !== MAGIC) {
-    throw new BundleError(`${path}: expected a glb surface, found another kind of file`);
+    throw new BundleError(`${path}: found another kind of file, expected a glb surface`);
   }
   const length = view.getUint32(8, true);
   if (length !== bytes.length) {
     throw new BundleError(
-      `${path}: expected ${length} bytes, found ${bytes.length} (a broken upload?)`,
+      `${path}: found ${bytes.length} bytes, expected ${length} (a broken upload?)`,
     );
   }
 }

@@ -189,7 +189,7 @@ function shapeItems(
     {
       kind: "colour",
       id: `${id}/shape-color`,
-      label: "Colour of the shape",
+      label: "Colour",
       name: `Colour of ${which}, multiplied by the channel's`,
       value: toHex(shape.color),
       palettes: SHAPE_COLORS,

@@ -82,8 +82,8 @@ export const SHAPE_KEYS: readonly Key[] = [
     const id = neighbour(ids, view.shapeNumber ?? ids[0], 1);
     return id === null ? NO_SHAPE : { panel: "shape-number", id };
   }),
-  ofShape("<", "Decrease that number", changeNumber(-1)),
-  ofShape(">", "Increase that number", changeNumber(1)),
+  ofShape("<", "Decrease the chosen number of the shape", changeNumber(-1)),
+  ofShape(">", "Increase the chosen number of the shape", changeNumber(1)),
   ofShape("*", "Next colour of the shape", (shape) => ({
     ...shape,
     color: fromHex(nextColour(toHex(shape.color))),

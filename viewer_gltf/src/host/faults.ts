@@ -4,7 +4,7 @@ import type { Action } from "../state/actions";
 import type { ViewerState } from "../state/viewer_state";
 
 /** Notice that is shown while the graphics driver may still restore the context. */
-export const DROPPED = "The graphics driver has dropped the picture. The page is drawing it again.";
+export const DROPPED = "The graphics driver has dropped the view. The page is drawing it again.";
 const WAITING = "The host does not answer. The page keeps trying; loaded parts stay on screen.";
 const OFFLINE = "This device is offline. Parts that are not loaded yet appear once it is online.";
 /** Faults of files that only refine surfaces or volumes. */

@@ -59,7 +59,7 @@ describe("the words for an item", () => {
   it.each([
     [
       UPLOADING,
-      "312 MB of 1.2 GB have arrived. Drop the same files again to go on. An unfinished upload is deleted after 24 hours.",
+      "312 MB of 1.2 GB have arrived. Drop the same files again to continue. An unfinished upload is deleted after 24 hours.",
     ],
     [item({ doing: "queued", place: 1 }), "This image is built next."],
     [item({ doing: "queued", place: 2 }), "This image is built after 1 other."],

@@ -56,7 +56,7 @@ export function wordsOf(
       if (upload !== null) return uploadWords(upload);
       if (isMoving) return `${arrivedText(item)} have arrived from another page.`;
       return (
-        `${arrivedText(item)} have arrived. Drop the same files again to go on.` +
+        `${arrivedText(item)} have arrived. Drop the same files again to continue.` +
         (hours > 0 ? ` An unfinished upload is deleted after ${hoursText(hours)}.` : "")
       );
     case "unpacking":

@@ -41,7 +41,7 @@ export function objectItems(
 const SAVE: Control = {
   kind: "button",
   id: "save-objects",
-  label: "Save as CSV (selected, or all shown)",
+  label: "Save as CSV (selected objects, or all shown)",
   to: () => "save-objects",
 };
 

@@ -7,7 +7,7 @@ import { halvePixelShare } from "../render/pixel_share";
 
 /** Milliseconds until the page offers a reload. Most drivers restore the context within a second. */
 const PATIENCE_MS = 5000;
-const LOST = "The graphics driver has dropped the picture and has not restored it.";
+const LOST = "The graphics driver has dropped the view and has not restored it.";
 const OFFER = "Reload with fewer pixels";
 
 /**

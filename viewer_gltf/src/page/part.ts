@@ -16,7 +16,7 @@ import { rememberChange, rememberedView } from "./remembered";
 /** Milliseconds between updates of the figures that change with each frame. */
 const REFRESH_MS = 250;
 const FEWER_PIXELS = "The view has fewer pixels until this tab is closed.";
-const NO_FULL_SCREEN = "This browser does not support the full screen for this page.";
+const NO_FULL_SCREEN = "This browser can't show this page in full screen.";
 
 class PagePart implements Part, PagePanel {
   readonly id = "page";

@@ -106,7 +106,14 @@ describe("an empty view", () => {
   it("reports that the isolated tile has only volumes, which are shown when near", () => {
     const content = { ...CONTENT, hasSurface: () => false };
     const alone = reduce(start, { type: "isolate", tile: TILE });
-    expect(explained(alone, content)).toContain("Move closer to see its volumes.");
+    for (const mode of ["disc", "tile"] as const) {
+      const text = explained({ ...alone, mode }, content);
+      expect(text).toContain("Move closer to see its volumes.");
+    }
+    for (const mode of ["stage", "off"] as const) {
+      const text = explained({ ...alone, mode }, content);
+      expect(text).toContain("Its volumes are not drawn in this mode.");
+    }
   });
 
   it("reports that the volumes of channels without surfaces are off", () => {

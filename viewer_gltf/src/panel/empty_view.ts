@@ -134,8 +134,12 @@ function emptyTile(
   const name = tileName(tile, state.tiles);
   if (volumes.includes(true)) {
     if (mode === "all" || mode === "traced" || isolated === null) return null;
+    const remedy =
+      mode === "disc" || mode === "tile"
+        ? "Move closer to see its volumes."
+        : "Its volumes are not drawn in this mode.";
     return {
-      text: `The shown channels have no surface in ${name}. Move closer to see its volumes.`,
+      text: `The shown channels have no surface in ${name}. ${remedy}`,
       offer: offerOf("Show volumes everywhere", setTo(MODE, "all")),
     };
   }

@@ -9,7 +9,7 @@ import { OWN } from "../state/transfer_functions_2d";
 export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>> = {
   mode: {
     disc: "Surfaces from afar. From near, a round window in the middle shows the volume.",
-    tile: "Surfaces from afar. From near, the tile that you chose or look at shows its volume.",
+    tile: "Surfaces from afar. From near, the selected tile, or the tile in the gaze, shows its volume.",
     all: "Translucent volumes in every tile, from any distance.",
     stage: "Each tile as the stage specifies: surface, volume or both.",
     traced:
@@ -35,7 +35,7 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
     line: "The length of a line through several points.",
   },
   quality: {
-    auto: "As fine as this device can draw smoothly.",
+    auto: "Draws as finely as this device can smoothly.",
     low: "Coarse, for slow devices.",
     high: "As fine as possible, even if slow.",
   },

@@ -268,7 +268,7 @@ describe("the keys", () => {
         const isSaid =
           "value" in request && typeof request.value !== "number"
             ? text !== ""
-            : /: (it is at its limit|the only one)$|^Slices: centred/.test(text);
+            : /: (at its limit|already so|the only one)$|^Slices: centred/.test(text);
         if (isSame && !isSaid) {
           silent.push(`${where} ${name}: ${text}`);
         }
@@ -281,8 +281,8 @@ describe("the keys", () => {
       if (request === null || isRefusal(request)) throw new Error(name);
       return spokenFeedback(request, atEnd, atEnd, new Map());
     };
-    expect(said("}")).toBe("Slices: x 100.0 %: it is at its limit");
-    expect(said("D")).toBe("Focus disc 40°: it is at its limit");
+    expect(said("}")).toBe("Slices: x 100.0 %: at its limit");
+    expect(said("D")).toBe("Focus disc 40°: at its limit");
   });
 
   it("go to the next tile, also while one is isolated", () => {

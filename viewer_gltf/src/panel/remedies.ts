@@ -27,7 +27,7 @@ export type Remedies = Readonly<Record<string, (now: RemedyContext) => Offer>>;
 
 const REMEDIES: Remedies = {
   [REFUSED.tile]: ({ state: { middle, tiles } }) => ({
-    label: `Only ${tileName(middle, tiles)}`,
+    label: `Show only ${tileName(middle, tiles)}`,
     to: [{ type: "isolate", tile: middle }],
   }),
   [REFUSED.near]: mode("Show a focus disc", "disc"),

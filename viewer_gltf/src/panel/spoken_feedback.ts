@@ -26,24 +26,35 @@ export function spokenFeedback(
 ): string {
   const text = spokenRequest(request, before, state, ranges);
   if (typeof request === "string" || "panel" in request || !isSame(before, state)) return text;
-  return text === "" ? "This changes nothing." : `${text}${whyUnchanged(request)}`;
+  return text === "" ? "This changes nothing." : `${text}${whyUnchanged(request, state)}`;
 }
 
-/** Returns why an action has changed nothing: a value at its limit, or the only choice. */
-function whyUnchanged(action: Action): string {
+/** Returns why an action has changed nothing: a value at its limit, the only choice, or the present choice. */
+function whyUnchanged(action: Action, state: ViewerState): string {
   switch (action.type) {
     case "set":
-      return typeof action.value === "number" ? ": it is at its limit" : "";
+      return typeof action.value === "number" ? ": at its limit" : "";
     case "window":
     case "set-shapes":
-      return ": it is at its limit";
+      return ": at its limit";
     case "choose-transfer-function":
     case "select":
     case "isolate":
-      return ": the only one";
+      return isOnlyChoice(action, state) ? ": the only one" : ": already so";
     default:
       return "";
   }
+}
+
+/** Returns whether a choice has no alternative: the only tile, or the only transfer function of a channel. */
+function isOnlyChoice(
+  action: Extract<Action, { type: "choose-transfer-function" | "select" | "isolate" }>,
+  { tiles, channels }: ViewerState,
+): boolean {
+  if (action.type !== "choose-transfer-function") {
+    return action.tile !== null && tiles.length === 1;
+  }
+  return channels.find(({ id }) => id === action.channel)?.transferFunctions.length === 1;
 }
 
 /** An edit makes new lists of shapes even if no number changes, so the contents are compared. */
@@ -97,7 +108,7 @@ function spokenAction(action: Action, state: ViewerState, ranges: Ranges): strin
       return parameterOf(action.id).spoken(state);
     case "select":
       return action.tile === null
-        ? "No tile chosen"
+        ? "No tile selected"
         : `Tile: ${tileName(action.tile, state.tiles)}`;
     case "isolate":
       return action.tile === null ? "All tiles" : `Only ${tileName(action.tile, state.tiles)}`;

@@ -54,8 +54,8 @@ function button(id: string, label: string, request: Request): Button {
 function tileControls({ tiles, isolated }: ViewerState, tile: string): readonly Control[] {
   if (tiles.length < 2) return [];
   return isolated === null
-    ? [button("isolate", "Only this tile", { type: "isolate", tile })]
-    : [button("isolate", "All tiles", { type: "isolate", tile: null })];
+    ? [button("isolate", "Show only this tile", { type: "isolate", tile })]
+    : [button("isolate", "Show all tiles", { type: "isolate", tile: null })];
 }
 
 function channelControls(state: ViewerState, channel: ChannelState): readonly Control[] {
@@ -92,8 +92,8 @@ function objectControls(state: ViewerState, channel: string, row: number): reado
   const left = hidden.filter((each) => each !== row);
   return [
     only === null
-      ? button("only-object", "Only this object", change({ only: [row] }))
-      : button("only-object", "All objects", change({ only: null })),
+      ? button("only-object", "Show only this object", change({ only: [row] }))
+      : button("only-object", "Show all objects", change({ only: null })),
     isHidden
       ? button("hide-object", "Show this object", change({ hidden: left }))
       : button("hide-object", "Hide this object", change({ hidden: [...hidden, row] })),

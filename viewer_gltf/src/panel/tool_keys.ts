@@ -20,8 +20,7 @@ function push(steps: number): Key["to"] {
     const clipPart = chosenClipPart(clip, view.clipPart);
     if (clipPart === undefined) return NOT_CUT;
     return (
-      moveClipPart(clipPart, steps, clip, shown) ??
-      no(`${clipPartName(clipPart)}: it is at its limit.`)
+      moveClipPart(clipPart, steps, clip, shown) ?? no(`${clipPartName(clipPart)}: at its limit.`)
     );
   };
 }
@@ -38,14 +37,14 @@ export const TOOL_KEYS: readonly Key[] = [
   })),
   key("N", "Next part of the cuts: a face, the plane, its rotation", nextClipPart(1)),
   key("B", "Previous part of the cuts", nextClipPart(-1)),
-  key(",", "Move or turn that part backwards", push(-1)),
-  key(".", "Move or turn that part forwards", push(1)),
+  key(",", "Move or turn the chosen part of the cuts backwards", push(-1)),
+  key(".", "Move or turn the chosen part of the cuts forwards", push(1)),
   key("l", "Copy a link to this view", "share"),
   key("Delete", "Dismiss the newest notice", ({ state }) => {
     const newest = groupNotices(state.notices).at(-1);
     return newest === undefined ? no(REFUSED.notice) : { type: "dismiss", texts: newest.of };
   }),
-  key("R", "Load again what failed to load", ({ state }) =>
+  key("R", "Load the failed files again", ({ state }) =>
     state.retryable.length === 0 ? no(REFUSED.failed) : "retry",
   ),
   key("h", "Hide or show the panel", { panel: "hide" }),

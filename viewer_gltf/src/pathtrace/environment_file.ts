@@ -67,7 +67,7 @@ function radianceOf(name: string, isFromBelow: boolean, parse: () => Parsed): Ra
   const parts = data instanceof Float32Array ? data.length / (width * height) : 0;
   if (!(data instanceof Float32Array) || width * height > MAX_TEXELS || parts < 3) {
     throw new BundleError(
-      `${name}: found ${width} x ${height} texels, expected an environment map in colour of at most 16384 x 8192.`,
+      `${name}: found ${width} x ${height} texels, expected a colour map of at most 134 million texels`,
     );
   }
   return reduced(data, width, height, parts, isFromBelow);

@@ -24,7 +24,7 @@ function nextNumber(by: number): Key["to"] {
   return ({ view }) => {
     const ids = NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, by);
-    return parameter === null ? no("There is no number.") : { panel: "parameter", parameter };
+    return parameter === null ? no("There is no setting.") : { panel: "parameter", parameter };
   };
 }
 
@@ -44,8 +44,8 @@ const KEYS: readonly Key[] = [
   ),
   key("F", "Choose the next setting of path tracing or stereo", nextNumber(1)),
   key("X", "Choose the previous setting of path tracing or stereo", nextNumber(-1)),
-  key("[", "Decrease the chosen setting", changeBy(-1)),
-  key("]", "Increase the chosen setting", changeBy(1)),
+  key("[", "Decrease the chosen setting of path tracing or stereo", changeBy(-1)),
+  key("]", "Increase the chosen setting of path tracing or stereo", changeBy(1)),
   ...[...MEDIUM, ...ROOM].flatMap(keysOf),
   key("U", "Light from a .hdr or .exr file", ({ state }) =>
     isTraced(state) ? "own-light" : no(TRACED_ALONE),

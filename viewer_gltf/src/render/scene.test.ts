@@ -4,7 +4,7 @@ import { sampleManifest } from "../../test/support/fixture/manifest";
 import { Backdrop } from "./backdrop";
 import { Room } from "./scene";
 
-describe("the outline of a chosen tile", () => {
+describe("the outline of a selected tile", () => {
   const outlineOf = (room: Room) => room.overlays[0];
 
   it("shows which of several tiles is chosen, and disappears again", () => {

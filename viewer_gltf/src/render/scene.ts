@@ -1,4 +1,4 @@
-/** The scene: the specimen, its light, the background, and the outline of the chosen tile. */
+/** The scene: the specimen, its light, the background, and the outline of the selected tile. */
 import {
   Box3,
   Box3Helper,

@@ -23,7 +23,7 @@ const KEYS: readonly Key[] = [
   key("^", "Choose the next setting of the slices: position or rotation", ({ view }) => {
     const ids = SLICE_NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, 1);
-    return parameter === null ? no("There is no number.") : { panel: "parameter", parameter };
+    return parameter === null ? no("There is no setting.") : { panel: "parameter", parameter };
   }),
   key("{", "Decrease the chosen setting of the slices", changeBy(-STEPS)),
   key("}", "Increase the chosen setting of the slices", changeBy(STEPS)),

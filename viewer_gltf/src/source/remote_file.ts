@@ -36,7 +36,7 @@ async function ask(url: URL, options: RequestInit = {}): Promise<Response | null
     if (ok) return response;
     const message = `The host ${url.host} answers ${status} for ${url.pathname}`;
     if (status === BUSY || status >= FIRST_SERVER_FAULT) {
-      throw new TemporaryError(`${message}. Try again later, or ask its operator.`);
+      throw new TemporaryError(`${message}. Try again later, or ask the operator of the host.`);
     }
     throw new SourceError(`${message}. Check the address, or ask the operator of the host.`);
   });
@@ -60,7 +60,7 @@ async function refusalOf(url: URL, cause: unknown): Promise<SourceError> {
   }
   const origin = globalThis.location?.origin ?? "*";
   return new RefusedError(
-    `The host ${host} does not let other pages read its files. Ask its operator to answer with the CORS header ` +
+    `The host ${host} does not let other pages read its files. Ask the operator of the host to answer with the CORS header ` +
       `Access-Control-Allow-Origin: ${origin} (or *).`,
     { cause },
   );
@@ -88,15 +88,15 @@ async function partOf(
   if (response.status !== PART) {
     await response.body?.cancel();
     throw new SourceError(
-      `The host ${url.host} does not send parts of files, which a zip file or a sharded image needs. Ask its operator ` +
+      `The host ${url.host} does not send parts of files, which a zip file or a sharded image needs. Ask the operator of the host ` +
         "to turn on HTTP range requests, or to offer the image unpacked and without shards.",
     );
   }
   const bytes = await bodyOf(response, url);
   if (bytes.length === length) return bytes;
   throw new SourceError(
-    `${url.pathname}: found ${bytes.length} of ${length} bytes from ${offset} on: the file is cut short, so whoever ` +
-      `runs ${url.host} has to upload it again.`,
+    `${url.pathname}: found ${bytes.length} of ${length} bytes from ${offset} on: the file is cut short. Ask the ` +
+      "operator of the host to upload it again.",
   );
 }
 
@@ -107,7 +107,7 @@ async function sizeOf(url: URL): Promise<number | null> {
   const size = Number(response.headers.get("Content-Length") ?? Number.NaN);
   if (Number.isFinite(size)) return size;
   throw new SourceError(
-    `The host ${url.host} states no Content-Length for ${url.pathname}. Ask its operator to let pages read that header.`,
+    `The host ${url.host} states no Content-Length for ${url.pathname}. Ask the operator of the host to let pages read that header.`,
   );
 }
 

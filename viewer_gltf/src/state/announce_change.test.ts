@@ -16,7 +16,7 @@ describe("an announcement", () => {
   it("names the channel that was hidden to show another", () => {
     const fifth: Action = { type: "show", channel: "c5", shown: true };
     expect(announcement(START, fifth)).toBe(
-      "Only 4 channels can be shown: Marker 0 was hidden to show Marker 5.",
+      "At most 4 channels can be shown at once: Marker 0 was hidden to show Marker 5.",
     );
     const room = reduce(START, { type: "show", channel: "c2", shown: false });
     expect(announcement(START, { type: "show", channel: "c2", shown: false })).toBeNull();

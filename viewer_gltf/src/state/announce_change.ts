@@ -23,7 +23,7 @@ function replacedChannel(before: ViewerState, after: ViewerState): string | null
   const added = after.channels.find(({ shown }, i) => shown && !before.channels[i].shown);
   const removed = after.channels.find(({ shown }, i) => !shown && before.channels[i].shown);
   if (added === undefined || removed === undefined) return null;
-  return `Only ${MAX_CHANNELS} channels can be shown: ${removed.name} was hidden to show ${added.name}.`;
+  return `At most ${MAX_CHANNELS} channels can be shown at once: ${removed.name} was hidden to show ${added.name}.`;
 }
 
 /** Announces that nothing is shown because the cuts remove all of the isolated tile. */

@@ -57,15 +57,15 @@ export const UNCHANGED_VIEW: Partial<Record<Command, string>> = {
   side: "The specimen is seen from the side already.",
   top: "The specimen is seen from the top already.",
   reset: "The view is the opening view already.",
-  "zoom-in": "The view cannot move any closer.",
-  "zoom-out": "The view cannot move any farther away.",
+  "zoom-in": "The view can't move any closer.",
+  "zoom-out": "The view can't move any farther away.",
   "turn-up": "The specimen is seen from the top already.",
   "turn-down": "The specimen is seen from below already.",
-  "pan-left": "The view cannot move further: its centre stays inside the specimen.",
-  "pan-right": "The view cannot move further: its centre stays inside the specimen.",
-  "pan-up": "The view cannot move further: its centre stays inside the specimen.",
-  "pan-down": "The view cannot move further: its centre stays inside the specimen.",
+  "pan-left": "The view can't move further: its centre stays inside the specimen.",
+  "pan-right": "The view can't move further: its centre stays inside the specimen.",
+  "pan-up": "The view can't move further: its centre stays inside the specimen.",
+  "pan-down": "The view can't move further: its centre stays inside the specimen.",
 };
 
 /** Announcement when the viewer cannot do what was requested. */
-export const UNAVAILABLE = "This viewer cannot do that here.";
+export const UNAVAILABLE = "This viewer can't do that here.";

@@ -86,7 +86,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
       staged.length > VOLUME_TILES_AT_START
         ? [
             `The stage draws ${staged.length} tiles as volumes, but only the ${VOLUME_TILES_AT_START} ` +
-              'nearest the centre open as volumes. Choose "Volumes everywhere" to draw the rest.',
+              "nearest to the centre open as volumes. Choose “Volumes everywhere” to draw the rest.",
           ]
         : [],
     retryable: [],

@@ -330,7 +330,7 @@ describe("the stage's choice for a tile", () => {
       new Set([...tilesOf("c0").map((each) => each.tile), state.middle]),
     );
     expect(state.notices).toEqual([
-      'The stage draws 20 tiles as volumes, but only the 16 nearest the centre open as volumes. Choose "Volumes everywhere" to draw the rest.',
+      "The stage draws 20 tiles as volumes, but only the 16 nearest to the centre open as volumes. Choose “Volumes everywhere” to draw the rest.",
     ]);
   });
 });

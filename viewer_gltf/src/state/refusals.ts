@@ -6,9 +6,9 @@
 const MODES = "under Surfaces and volumes";
 
 export const REFUSED = {
-  tile: "No tile is chosen, and none is in the middle of the view: choose one under Tiles.",
+  tile: "No tile is selected, and none is in the middle of the view: select one under Tiles.",
   tileAhead: "No tile is in the middle of the view.",
-  back: "No tile is chosen, so there is nothing to go back from.",
+  back: "No tile is selected, so there is nothing to go back from.",
   near: `This mode shows volumes at every distance, or none: choose a focus disc or one tile ${MODES}.`,
   disc: `This mode has no focus disc: choose “Focus disc of volume” ${MODES}.`,
   marched: `This mode draws no translucent volumes: choose “Volumes everywhere” ${MODES}.`,

@@ -4,13 +4,13 @@ import { SCREEN_STEREO, STEREO_PARAMETERS } from "../state/parameters/tools";
 
 const KEYS: readonly Key[] = [
   key("V", "Enter stereo (VR), or leave it", "stereo"),
-  key("Home", "Enter your room (AR), or leave it", "room"),
-  key("L", "Next phone viewer", ({ view }) => {
+  key("Home", "View in your room (AR), or leave it", "room"),
+  key("L", "Next Cardboard viewer", ({ view }) => {
     const lenses = neighbour(LENSES, view.lenses, 1);
-    return lenses === null ? no("There is no phone viewer.") : { panel: "lenses", lenses };
+    return lenses === null ? no("There is no Cardboard viewer.") : { panel: "lenses", lenses };
   }),
-  key("P", "Split screen for a phone viewer", "split"),
-  key("K", "Scan the phone viewer's code", "scan"),
+  key("P", "Split screen for a Cardboard viewer", "split"),
+  key("K", "Scan the Cardboard viewer's code", "scan"),
   key(":", "Measure the screen with a card, for the split screen", "measure-screen"),
   ...[SCREEN_STEREO, ...STEREO_PARAMETERS].flatMap(keysOf),
 ];

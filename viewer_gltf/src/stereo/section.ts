@@ -51,7 +51,7 @@ function splitItems(
   const fault = lenses === "own" ? faultOfCode(code) : "";
   const items: Control[] = [
     {
-      ...inline("lenses", "Phone viewer", lenses, LENS_NAMES, LENSES, (each) => ({
+      ...inline("lenses", "Cardboard viewer", lenses, LENS_NAMES, LENSES, (each) => ({
         panel: "lenses",
         lenses: each,
       })),

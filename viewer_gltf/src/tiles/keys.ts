@@ -18,14 +18,18 @@ function nextTile(by: number): Key["to"] {
 const KEYS: readonly Key[] = [
   key("t", "Next tile", nextTile(1)),
   key("T", "Previous tile", nextTile(-1)),
-  key("i", "Show only the selected or gazed tile; again: all tiles", (context) => {
-    const { state, focusTile } = context;
-    if (state.isolated !== null) return { type: "isolate", tile: null };
-    const tile = state.selected ?? focusTile;
-    if (tile === null) return no(REFUSED.tile);
-    return { type: "isolate", tile };
-  }),
-  key("g", "Select the gazed tile; again: isolate it", ({ state, focusTile }) =>
+  key(
+    "i",
+    "Show only the selected tile, or the tile in the gaze; again: show all tiles",
+    (context) => {
+      const { state, focusTile } = context;
+      if (state.isolated !== null) return { type: "isolate", tile: null };
+      const tile = state.selected ?? focusTile;
+      if (tile === null) return no(REFUSED.tile);
+      return { type: "isolate", tile };
+    },
+  ),
+  key("g", "Select the tile in the gaze; again: show only this tile", ({ state, focusTile }) =>
     focusTile === null ? no(REFUSED.tileAhead) : chosenTile(state, focusTile),
   ),
   key(

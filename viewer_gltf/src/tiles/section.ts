@@ -51,7 +51,7 @@ function tileItems(state: ViewerState, focusTile: string | null): readonly Contr
     {
       kind: "toggle",
       id: "isolate",
-      label: isolated === null ? "Only this tile" : `Only ${tileName(isolated, state.tiles)}`,
+      label: `Show only ${isolated === null ? "this tile" : tileName(isolated, state.tiles)}`,
       value: isolated !== null,
       refusal: alone === null ? REFUSED.tile : "",
       to: (value) => ({ type: "isolate", tile: value ? alone : null }),

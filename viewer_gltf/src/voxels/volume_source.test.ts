@@ -79,6 +79,6 @@ describe("a level that is fetched by range", () => {
 
   it("is rejected if it is too short", async () => {
     serve(FILE.subarray(0, 70));
-    await expect(source().level(0, signal)).rejects.toThrow("expected 100 bytes, found 70");
+    await expect(source().level(0, signal)).rejects.toThrow("found 70 bytes, expected 100");
   });
 });

@@ -9,7 +9,7 @@ import type { Setting } from "./panel/placement";
  */
 export function howItWorks(setting: Setting): string {
   const way = setting === "over-table" ? "up" : "down";
-  return `Look ${way} for a bar.\nRest or press to choose.\nHold: move specimen.`;
+  return `Look ${way} for a bar.\nRest or press to choose.\nHold to move it.`;
 }
 /** Number of times that the card is shown on a device. */
 const TIMES_SHOWN = 3;

@@ -41,5 +41,5 @@ export async function findXrSupport(
     if (!(error instanceof DOMException)) throw error;
     return { isAvailable: false, reason: `The browser refuses WebXR here: ${error.message}` };
   }
-  return { isAvailable: false, reason: "No headset or phone viewer was found." };
+  return { isAvailable: false, reason: "No headset or Cardboard viewer was found." };
 }

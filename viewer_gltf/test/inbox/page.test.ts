@@ -137,7 +137,7 @@ describeInChromium("the inbox", () => {
     expect(server.cuts).toEqual([]);
     expect(await card().locator("h2").textContent()).toBe("series");
     await page.reload();
-    await expectWords(/have arrived\. Drop the same files again to go on/);
+    await expectWords(/have arrived\. Drop the same files again to continue/);
     const before = Number(only().bytes);
     expect(before).toBeLessThan(TOTAL);
     server.delay_ms = 0;

@@ -55,7 +55,7 @@ describe.skipIf(!IS_AVAILABLE)("with its server", () => {
       await browser.context.setOffline(false);
       await expect.poll(shareOf).toBeGreaterThan(0.4);
       await page.reload();
-      await expect.poll(words).toMatch(/Drop the same files again to go on/);
+      await expect.poll(words).toMatch(/Drop the same files again to continue/);
       expect(await shareOf()).toBeLessThan(1);
       await drop(page, MRI);
       await expect.poll(state).toBe("Ready");

@@ -89,7 +89,7 @@ describeInChromium("a fault between host and page", () => {
     await stand.viewer.drawVolume("Block", true);
     await stand.viewer.chooseMode("all");
     expect((await notices()).join()).toContain(
-      `${path}: expected ${whole.length} bytes, found 100 (a broken upload?)`,
+      `${path}: found 100 bytes, expected ${whole.length} (a broken upload?)`,
     );
     // the volume of the other tile
     expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);

@@ -218,7 +218,7 @@ describeInChromium("the viewer", () => {
       body: "<html>Sign in</html>",
     });
     const text = await fatalText(`${stand.host.address}/app/?bundle=../bundle/`);
-    expect(text).toContain('manifest.json: expected JSON, found "<html>Sign in</html>"');
+    expect(text).toContain('manifest.json: found "<html>Sign in</html>", expected JSON');
   });
 
   it("reports on the page that the browser has no WebGL 2", async () => {
@@ -240,7 +240,7 @@ describeInChromium("the viewer", () => {
     const notices = stand.viewer.page.locator("[data-notices]");
     const text = await notices.textContent();
     expect(text).toContain(`volumes/${tile}/${id}.ktx2: not found (404)`);
-    expect(text).toMatch(new RegExp(`${lut}: expected \\d+ bytes, found 12`));
+    expect(text).toMatch(new RegExp(`${lut}: found 12 bytes, expected \\d+`));
     const picture = await takePicture(stand.viewer.page);
     expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     await notices.locator("p", { hasText: "(404)" }).getByRole("button").click();

@@ -326,7 +326,7 @@ describeInChromium("the panel of a page with other conditions", () => {
     expect(shown.map(({ id }) => id)).toEqual(["Balls", "Block", "marker_0", "marker_42"]);
     expect(await focused()).toBe("marker_42/shown");
     expect(await page().locator("[data-said]").textContent()).toBe(
-      "Only 4 channels can be shown: F body was hidden to show Marker 42.",
+      "At most 4 channels can be shown at once: F body was hidden to show Marker 42.",
     );
     // the announcement is not a notice, and disappears by itself
     expect((await state()).notices).toEqual([]);

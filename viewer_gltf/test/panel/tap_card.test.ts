@@ -100,7 +100,7 @@ describeInChromium("the card beside a tapped place", () => {
     const isInside = () =>
       page().evaluate(() => document.activeElement?.closest("[data-tap-card]") !== null);
     await expect.poll(isInside).toBe(true);
-    await page().keyboard.press("Enter"); // the first button takes this key: Only this tile
+    await page().keyboard.press("Enter"); // the first button takes this key: Show only this tile
     expect((await state()).isolated).toBe(selected);
     await page().keyboard.press("Escape");
     expect(await card().isVisible()).toBe(false);

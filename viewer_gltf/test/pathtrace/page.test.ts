@@ -301,7 +301,7 @@ describeInChromium("the path-traced page", () => {
     expect(others(green)).toBeLessThan(0.03 * drawn(green));
 
     await changeContext(page(), "loseContext");
-    await expect.poll(notices).toEqual([expect.stringContaining("dropped the picture")]);
+    await expect.poll(notices).toEqual([expect.stringContaining("dropped the view")]);
     await changeContext(page(), "restoreContext");
     await expect.poll(notices).toEqual([]);
     await stand.viewer.settled();

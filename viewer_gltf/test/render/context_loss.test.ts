@@ -35,7 +35,7 @@ describeInChromium("a graphics driver", () => {
     changeContext(stand.viewer.page, change);
   const loseAndRestore = async () => {
     await call("loseContext");
-    await expect.poll(notices).toEqual([expect.stringContaining("dropped the picture")]);
+    await expect.poll(notices).toEqual([expect.stringContaining("dropped the view")]);
     await call("restoreContext");
     await expect.poll(notices).toEqual([]);
     await stand.viewer.settled();

@@ -152,7 +152,9 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       it("the host allows no other page", async () => {
         const text = await faultOf(`${other.address}/v04.ome.zarr`);
         const { origin } = new URL(stand.host.address);
-        expect(text).toContain("does not let other pages read its files. Ask its operator to");
+        expect(text).toContain(
+          "does not let other pages read its files. Ask the operator of the host to",
+        );
         expect(text).toContain(`Access-Control-Allow-Origin: ${origin}`);
       });
 
@@ -161,7 +163,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         other.hasRanges = false;
         const text = await faultOf(`${other.address}/${name}`);
         expect(text).toContain("does not send parts of files");
-        expect(text).toContain("Ask its operator to turn on HTTP range requests");
+        expect(text).toContain("Ask the operator of the host to turn on HTTP range requests");
       });
 
       it("a codec is unknown, a file is damaged, or there is no image", async () => {

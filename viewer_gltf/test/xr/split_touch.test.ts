@@ -80,7 +80,7 @@ describeInChromium("fingers in a Cardboard", () => {
       await touch(type, [finger(type === "touchStart" ? 300 : 360)]);
     }
     await touch("touchEnd", []);
-    expect((await chosen())[1]).toBeNull(); // a drag over a chosen tile does not isolate it
+    expect((await chosen())[1]).toBeNull(); // a drag over a selected tile does not isolate it
 
     // while held, the specimen follows the head, and comes nearer when the head tilts down
     const turnHead = async (alpha: number, beta: number) => {

@@ -7,7 +7,7 @@ import type { MapTile, TileMap } from "../controls";
 import { hooks, type Send, type Widget } from "./widget";
 
 function nameOf({ id, title, isFocus, isSelected, isIsolated }: MapTile): string {
-  const marks = [isIsolated && "shown alone", isSelected && "selected", isFocus && "looked at"];
+  const marks = [isIsolated && "shown alone", isSelected && "selected", isFocus && "in the gaze"];
   // users of voice control call a button by the text on it, so the name ends with that text
   const names = [title, ...marks.filter(Boolean), shortTileName(id)];
   return [...new Set(names)].join(", ");

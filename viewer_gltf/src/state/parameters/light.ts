@@ -142,7 +142,7 @@ export const LAMPS_SHOWN: SwitchParameter<Light> = {
   kind: "switch",
   id: "trace/lamps",
   label: "Show lamps",
-  name: () => "Show the lamps, so that they can be dragged",
+  name: () => "Show lamps, which can be dragged",
   link: "lamps",
   refusal,
   ...lens("areLampsShown"),

@@ -215,7 +215,7 @@ class Running {
     listenForFingers(stage, onGesture, signal);
     const onKey = (event: KeyboardEvent) => {
       if (event.key !== "Escape") return;
-      event.preventDefault(); // on the page, Escape would also leave the chosen tile
+      event.preventDefault(); // on the page, Escape would also leave the selected tile
       end();
     };
     addEventListener("keydown", onKey, { signal, capture: true });

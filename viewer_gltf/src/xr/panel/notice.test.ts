@@ -1,12 +1,13 @@
 import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
+import { REFUSED } from "../../state/refusals";
 import { StereoNotice } from "./notice";
 import { NOTICE_HEIGHT, NOTICE_PX_PER_M, NOTICE_WIDTH, textsHeight } from "./notice_queue";
 import { bearingOf, PANEL_DISTANCE_M, pointAt } from "./placement";
 
 const DEG = Math.PI / 180;
 const EYE = new Vector3(0.1, 1.6, 0.2);
-const LONG = "This mode shows volumes at every distance, or none: choose one with near volumes.";
+const LONG = REFUSED.near;
 
 /** A head at EYE with this pitch. */
 const headAt = (pitch_deg: number) => new Matrix4().makeRotationX(pitch_deg * DEG).setPosition(EYE);
