@@ -109,7 +109,7 @@ def test_a_length_or_auto_can_have_a_flag(capsys: pytest.CaptureFixture[str]) ->
         (["--channels", "a,,b"], "--channels is 'a,,b', expected names or indices"),
         (["--iso-value", "=3"], "--iso-value is '=3', expected CHANNEL=VALUE"),
         (["--iso-value", "a=b"], "--iso-value is 'a=b', expected CHANNEL=VALUE"),
-        (["--paint", "a="], "--paint is 'a=', expected CHANNEL=CHANNEL, as CD31=MART1"),
+        (["--paint", "a="], "--paint is 'a=', expected CHANNEL=CHANNEL, such as CD31=MART1"),
     ],
 )
 def test_what_is_no_setting_is_told_by_its_flag(words: list[str], message: str) -> None:

@@ -132,7 +132,7 @@ def test_a_cluster_that_does_not_see_out_is_refused(cluster: Joined, tmp_path: P
         (
             "_digest_of_code",
             lambda: "other",
-            "runs other code than this command: expected the same",
+            "runs other code than this command, expected the same",
         ),
     ],
 )

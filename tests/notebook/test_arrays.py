@@ -90,9 +90,13 @@ def test_xarray_s_units_are_lengths_and_its_channels_have_names(tmp_path):
         (
             of_xarray(np.zeros((4, 4, 4)), z=(0, 1, 2, 9)),
             {"spacing_um": None},
-            "along z are uneven",
+            "along z are uneven, expected even ones: pass spacing_um",
         ),
-        (of_xarray(np.zeros((4, 4, 4)), units="s"), {"spacing_um": None}, "'s', not a length"),
+        (
+            of_xarray(np.zeros((4, 4, 4)), units="s"),
+            {"spacing_um": None},
+            "'s', expected a length: pass spacing_um",
+        ),
     ],
 )
 def test_array_that_is_not_a_volume_is_refused_in_one_line(array, more, message):

@@ -69,7 +69,7 @@ def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_for_a_ct_are_printed
     chosen, (assumed, advice) = choose_preset(open_dataset(source))
     assert chosen == "mri"
     assert words in assumed + advice
-    assert "no modality is stated: MR is assumed (--preset none takes the defaults)" in assumed
+    assert "no modality is stated: MR is assumed (or --preset none for the defaults)" in assumed
     assert "for a CT --preset ct --iso-value 0=" in advice
     assert ("no scaling to Hounsfield units is known" in advice) == (voxels.dtype == np.uint8)
     assert ("plus 1024 are typical of a CT" in advice) == (voxels.dtype != np.uint8)
@@ -171,7 +171,7 @@ def test_a_note_doubts_a_stated_ct_with_unsigned_values(tmp_path: Path) -> None:
     (tmp_path / "a.mha").write_bytes(head.encode() + voxels.tobytes())
     chosen, reason = choose_preset(open_dataset(tmp_path / "a.mha"))
     assert chosen == "ct"
-    assert reason[0] == "preset ct: the input is CT (--preset none takes the defaults)"
+    assert reason[0] == "preset ct: the input is CT (or --preset none for the defaults)"
     assert "plus 1024, and its level of -300 is meant for Hounsfield units" in reason[1]
     assert "--preset ct --iso-value 0=724 --window 0=0:3024" in reason[1]
 

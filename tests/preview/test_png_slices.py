@@ -238,7 +238,10 @@ def test_microscopy_has_planes_by_its_axes_with_square_pixels(
         "states no position in a patient" in capsys.readouterr().err
     )  # also if several channels are requested
     assert main(["slices", str(two), "-o", str(tmp_path / "no")]) == 2
-    assert "found Channel0, Channel1; choose one of them by --channels" in capsys.readouterr().err
+    assert (
+        "found channels Channel0, Channel1, expected one: choose it by --channels"
+        in capsys.readouterr().err
+    )
     written(two, tmp_path / "one", "--channels", "Channel1")
 
 
@@ -292,5 +295,5 @@ def test_more_than_one_channel_is_wrong_usage(
     both = np.stack([phantoms.f_phantom()] * 2)
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", both, axes="CZYX", names=["A", "B"])
     assert main(["slices", str(source), "-o", str(tmp_path / "out")]) == 2
-    assert "found A, B; choose one of them by --channels" in capsys.readouterr().err
+    assert "found channels A, B, expected one: choose it by --channels" in capsys.readouterr().err
     assert main(["slices", str(source), "-o", str(tmp_path / "out"), "--channels", "B"]) == 0

@@ -174,7 +174,7 @@ CASES: dict[str, tuple[Maker, str]] = {
     ),
     "empty multiscales": (
         zarr_with(lambda content: content["attributes"]["ome"].update(multiscales=[])),
-        "no multiscales",
+        "found no multiscales, expected the attribute",
     ),
     "no attributes": (
         zarr_with(lambda content: content.pop("attributes")),
@@ -182,7 +182,7 @@ CASES: dict[str, tuple[Maker, str]] = {
     ),
     "plate": (
         zarr_with(lambda content: content.update(attributes={"ome": {"plate": {}}})),
-        "no multiscales: found a plate",
+        "found a plate",
     ),
     "many series": (
         zarr_with(lambda content: content.update(attributes={"ome": {"bioformats2raw.layout": 3}})),

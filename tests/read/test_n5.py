@@ -49,7 +49,7 @@ def test_a_block_with_too_few_voxels_for_its_place_is_refused(tmp_path: Path, si
     assert struct.unpack_from(">3I", content, 4) == (16, 12, 8)
     struct.pack_into(">I", content, 4 + 8, size)
     block.write_bytes(content[: 16 + 16 * 12 * size * 2])
-    assert f"a block of ({size}, 12, 16) voxels, fewer than (8, 12, 16)" in refusal(path)
+    assert f"a block of ({size}, 12, 16) voxels, expected at least (8, 12, 16)" in refusal(path)
 
 
 def test_an_absent_block_is_zero(tmp_path: Path) -> None:

@@ -175,7 +175,7 @@ def test_a_given_spacing_replaces_a_missing_one(tmp_path: Path, suffix: str) -> 
 
 @pytest.mark.parametrize("bad", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, float("nan"))])
 def test_a_given_spacing_must_be_a_length(tiny_tiff: Path, bad: tuple[float, float, float]) -> None:
-    with pytest.raises(UsageError, match=r"--spacing-um: found .*, expected z,y,x in um"):
+    with pytest.raises(UsageError, match=r"--spacing-um is .*, expected z,y,x in um"):
         read.open(tiny_tiff, spacing_um=bad)
 
 

@@ -62,9 +62,10 @@ def test_a_plate_lists_its_wells_and_a_well_lists_its_images(tmp_path: Path, ver
     path = plate(tmp_path / "my plate's.zarr", version, wells)
     told = refusal(path)
     assert "a plate of 12 wells (A/01, A/02, A/03, A/04, B/01, B/02, B/03, B/04 and 4 more)" in told
-    assert f"open an image of a well by its path, such as {path}/A/01/0, expected" in told
+    assert told.endswith(f": open an image of a well by its path, such as {path}/A/01/0")
     told = refusal(path / "A" / "01")
-    assert f"a well of 2 images (0, 1); open one by its path, such as {path}/A/01/0" in told
+    assert "found a well of 2 images (0, 1), expected the attribute `multiscales`" in told
+    assert told.endswith(f": open one by its path, such as {path}/A/01/0")
     assert "found 2 groups (01, 02)" in refusal(path / "A")
     for field in (0, 1):
         dataset = read.open(path / "A" / "02" / str(field))
@@ -89,7 +90,7 @@ def test_a_container_lists_its_images_and_a_single_one_is_opened(
             told = refusal(path)
             held = f"found 3 images ({', '.join(names)}) in one container (bioformats2raw.layout)"
             assert held in told
-            assert f"as {path}/{names[0]}, expected" in told
+            assert told.endswith(f"such as {path}/{names[0]}")
         dataset = read.open(path if count == 1 else path / names[2])
         assert np.array_equal(dataset.read(0, dataset.levels[0].box).voxels, f_phantom())
 
@@ -109,7 +110,7 @@ def test_a_container_in_itself_is_refused(tmp_path: Path) -> None:
     for series in (".", "0"):
         group(path / "OME", "0.5", {"series": [series]})
         group(path / "0", "0.5", {"bioformats2raw.layout": 3})
-        assert "no multiscales: found " in refusal(path)
+        assert "expected the attribute `multiscales`" in refusal(path)
     group(path / "0" / "OME", "0.5", {"series": ["."]})
     assert "found 1 image (.) in one container" in refusal(path)
 
@@ -180,7 +181,7 @@ def test_metadata_of_another_form_are_refused_in_one_short_line(
     tmp_path: Path, ome: dict[str, Any]
 ) -> None:
     told = refusal(group(tmp_path / "g.zarr", "0.5", ome))
-    assert "no multiscales: found" in told
+    assert "expected the attribute `multiscales`" in told
     assert told.isprintable()
     assert len(told) < 600
 

@@ -308,7 +308,9 @@ def test_tokens_and_sessions_are_long_and_differ():
 
 def test_no_network_is_one_line(tmp_path, monkeypatch, capsys):
     def none():
-        raise StereoCellError("--lan: this machine has no address on a network, expected one")
+        raise StereoCellError(
+            "--lan: this machine has no address on a network, expected one: connect it"
+        )
 
     plain_bundle.write(tmp_path, plain_bundle.FILES)
     monkeypatch.setattr(serve_module, "find_addresses", none)

@@ -103,7 +103,7 @@ def test_a_source_that_cant_be_read_is_answered_in_a_sentence(live: Live) -> Non
         live.first.set_exception(SourceError("f.tif: cut off"))
         response, body = ask(port, "/manifest.json")
         assert response.status == 503
-        assert body == b"the source can't be shown; see the terminal"
+        assert body == b"the source can't be shown: see the terminal"
 
 
 def test_the_manifest_is_that_of_the_newest_view_and_names_its_folder(

@@ -374,7 +374,7 @@ def test_a_missing_bundle_is_one_line_that_says_how_to_make_it(
     for command in ("view", "serve"):
         assert main([command, str(tmp_path), "--port", "0"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
-        assert "manifest.json: not found, expected a built bundle" in line
+        assert "manifest.json: not found, expected a built bundle: run" in line
         assert f"`stereocell bundle {tmp_path}`" in line
 
 

@@ -132,7 +132,10 @@ def test_the_boundary_of_a_reader_does_not_catch_errors_of_stereocell_s_parsing(
 
 
 def test_the_boundary_of_a_reader_quotes_no_text_of_the_library() -> None:
-    with pytest.raises(SourceError) as caught, library_boundary("a.dcm", "DICOM that is whole"):
+    with (
+        pytest.raises(SourceError) as caught,
+        library_boundary("a.dcm", "a complete source (DICOM)"),
+    ):
         raised_in_a_library(ValueError("PatientName is Jane Doe"))
     assert "Jane" not in str(caught.value)
     assert "(ValueError)" in str(caught.value)

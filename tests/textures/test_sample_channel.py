@@ -167,10 +167,10 @@ def test_the_bundle_shows_the_paint(built: Path) -> None:
 @pytest.mark.parametrize(
     ("flag", "message"),
     [
-        ("body", "--paint is 'body', expected CHANNEL=CHANNEL, as CD31=MART1"),
+        ("body", "--paint is 'body', expected CHANNEL=CHANNEL, such as CD31=MART1"),
         ("body=", "--paint is 'body=', expected CHANNEL=CHANNEL"),
         ("body=CD4", "--paint names channel 'CD4', expected one of body, marker, other, or an in"),
-        ("body=0", "--paint body=body: expected another channel than its own"),
+        ("body=0", "--paint is body=body, expected another channel than its own"),
     ],
 )
 def test_an_error_about_paint_is_one_line(

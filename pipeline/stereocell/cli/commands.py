@@ -286,7 +286,7 @@ def sample(options: argparse.Namespace) -> Answer:
     if options.name == "cycif":
         columns, _, rows = options.grid.partition("x")
         if not (columns.isdecimal() and rows.isdecimal() and int(columns) and int(rows)):
-            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
+            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, such as 5x2")
         z, y, x = numbers(options.tile_size, int, "--tile-size")
         samples.write_cycif(
             options.out,

@@ -161,7 +161,7 @@ def _named(text: str) -> str:
     scheme, mark, place = text.partition("://")
     if mark and not (place if scheme == "file" else place.strip("/")):
         raise argparse.ArgumentTypeError(
-            f"is {text!r}, expected more behind it, as {scheme}://bucket/specimen"
+            f"is {text!r}, expected more behind it, such as {scheme}://bucket/specimen"
         )
     return text
 
@@ -244,13 +244,13 @@ def _pair(flag: Flag, kind: type, text: str) -> tuple[str, Any]:
     except ValueError:
         given = ""
     if not name or given == "":
-        example = ", as CD31=MART1" if flag.form == "CHANNEL=CHANNEL" else ""
+        example = ", such as CD31=MART1" if flag.form == "CHANNEL=CHANNEL" else ""
         raise UsageError(f"{flag.name} is {text!r}, expected {flag.form}{example}")
     return name, given
 
 
 def _number_or_text(text: str) -> float | str:
-    """Return a number, or the text of a number above the background, as 162+b.
+    """Return a number, or the text of a number above the background, such as 162+b.
 
     Raises ValueError for any other text.
     """
@@ -301,10 +301,13 @@ def declare_iso(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `iso`."""
     declare_source(parser)
     parser.add_argument(
-        "--channel", required=True, metavar="X", help="channel, by its name or its index, as CD31"
+        "--channel",
+        required=True,
+        metavar="X",
+        help="channel, by its name or its index, such as CD31",
     )
     parser.add_argument(
-        "--tile", required=True, help="tile, by the name that a build gives it, as r0_c0"
+        "--tile", required=True, help="tile, by the name that a build gives it, such as r0_c0"
     )
     parser.add_argument(
         "-o",
@@ -320,7 +323,9 @@ def declare_units(parser: argparse.ArgumentParser) -> None:
     declare_out(parser)
     declare_workers(parser)
     parser.add_argument(
-        "--only", metavar="TILE/CHANNEL", help="build one channel of one tile alone, as r0_c3/CD31"
+        "--only",
+        metavar="TILE/CHANNEL",
+        help="build one channel of one tile alone, such as r0_c3/CD31",
     )
 
 
@@ -411,7 +416,7 @@ def declare_sample(parser: argparse.ArgumentParser) -> None:
         "--brightness-spread",
         type=float,
         default=1.0,
-        help="the brightest cell is 1 + this times as bright as the darkest (default %(default)s)",
+        help="cells are up to 1 + this times as bright as the darkest (default %(default)s)",
     )
 
 

@@ -53,7 +53,7 @@ def join(scheduler: str, shared: Path | None) -> Any:
     is_file = Path(scheduler).is_file()
     address = _address_in(Path(scheduler)) if is_file else scheduler
     if not is_file and not _ADDRESS.fullmatch(address):
-        raise ClusterError(f"--scheduler {scheduler}: found no such file; {_EXPECTED}")
+        raise ClusterError(f"--scheduler {scheduler}: found no such file, {_EXPECTED}")
     from distributed import Client
 
     try:
@@ -79,10 +79,10 @@ def _reason(error: Exception) -> str:
     text = str(error).splitlines()[0] if str(error) else "the scheduler does not answer"
     if isinstance(error, TypeError) and "ssl_context" in text:  # Dask's message
         return (
-            "the scheduler admits only clients with a certificate, and this command has none; "
+            "the scheduler admits only clients with a certificate, and this command has none, "
             f"{_TLS_HELP}"
         )
-    return f"{text}; {_EXPECTED}"
+    return f"{text}, {_EXPECTED}"
 
 
 def _address_in(file: Path) -> str:
@@ -91,10 +91,10 @@ def _address_in(file: Path) -> str:
         with file.open("rb") as opened:
             content = json.loads(opened.read(_MAX_BYTES))
     except (OSError, ValueError, RecursionError) as error:
-        raise ClusterError(f"--scheduler {file}: {error!s:.100}; {_EXPECTED}") from None
+        raise ClusterError(f"--scheduler {file}: {error!s:.100}, {_EXPECTED}") from None
     address = content.get("address") if isinstance(content, dict) else None
     if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
-        raise ClusterError(f"--scheduler {file}: address: found {address!r:.100}; {_EXPECTED}")
+        raise ClusterError(f"--scheduler {file}: address: found {address!r:.100}, {_EXPECTED}")
     return address
 
 
@@ -168,7 +168,7 @@ def _require_alike(
             raise ClusterError(f"{who}: has {name} {found[name]}, expected {expected}")
     if worker.code != ours.code:
         raise ClusterError(
-            f"{who}: runs other code than this command: expected the same installation of "
+            f"{who}: runs other code than this command, expected the same installation of "
             "StereoCell, and workers that were started after it"
         )
     if not worker.sees:

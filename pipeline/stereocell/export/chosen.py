@@ -229,7 +229,7 @@ class Chosen:
         if not levels:
             least = min(counts)
             raise UsageError(
-                f"--max-triangles is {most}: the coarsest level has {least}: expected as many, or "
+                f"--max-triangles is {most}: the coarsest level has {least}, expected as many, or "
                 "fewer --tiles or --channels"
             )
         return levels

@@ -88,7 +88,7 @@ def parse_region(text: str) -> Region:
         low = high = ()
     if len(low) != 3 or not all(a < b for a, b in zip(low, high, strict=True)):
         raise UsageError(
-            f"--region is {text!r}, expected x0:x1,y0:y1,z0:z1 in um, as 0:20,:,5:12.5"
+            f"--region is {text!r}, expected x0:x1,y0:y1,z0:z1 in um, such as 0:20,:,5:12.5"
         )
     (x0, y0, z0), (x1, y1, z1) = low, high
     return Region((x0, y0, z0), (x1, y1, z1))

@@ -67,7 +67,7 @@ def _finest_that_fits(
     if len(document) > most:
         raise UsageError(
             f"--max-mb is {most / MB_BYTES:g}: the page with the coarsest surfaces and volumes "
-            f"takes {ceil(len(document) / MB_BYTES * 100) / 100:.2f} MB: expected as much, or "
+            f"takes {ceil(len(document) / MB_BYTES * 100) / 100:.2f} MB, expected as much, or "
             "fewer --channels"
         )
     growing = [kind for kind in ("surfaces", "volumes") if getattr(levels, kind) > 0]

@@ -59,7 +59,7 @@ def to_solid(
     x, y, z = positions[edges[0, 0]].tolist()
     raise StageError(
         f"{name}: its surface is open at {len(edges)} edges, one at ({x:.4g}, {y:.4g}, {z:.4g}) um:"
-        " an edit opened it: expected a closed surface"
+        " an edit opened it, expected a closed surface"
     )
 
 

@@ -255,7 +255,7 @@ def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
             return line
         chosen.report(f"lod{level} takes {size} bytes, more than {most}")
     raise UsageError(
-        f"--max-bytes is {most}: the smallest file has {size}: expected as many, or fewer --tiles "
+        f"--max-bytes is {most}: the smallest file has {size}, expected as many, or fewer --tiles "
         "or --channels"
     )
 

@@ -172,8 +172,8 @@ class Document:
                 length = 12 + 8 + len(text) + 8 + size
                 if length > _MAX_BYTES:
                     raise OutputError(
-                        f"{path}: {length} bytes, more than a .glb can have. Use a coarser --lod, "
-                        "fewer --tiles, or --compress meshopt"
+                        f"{path}: found {length} bytes, expected at most {_MAX_BYTES} in a .glb: "
+                        "use a coarser --lod, fewer --tiles, or --compress meshopt"
                     )
                 file.write(struct.pack("<4sII", b"glTF", 2, length))
                 file.write(struct.pack("<I4s", len(text), b"JSON") + text)

@@ -26,7 +26,7 @@ _UNPACKED = "unpacked"
 _DICOM, _DICOM_ENDINGS, _INDEX = "dicom", (".dcm", ".dicom", ".ima"), "dicomdir"
 _HEADERS = (".mhd", ".nhdr", ".xml", ".xmf", ".companion.ome")  # text files that name other files
 _HEADER_BYTES = 1 << 20  # bytes, largest header in which names are replaced
-_ONE_BY_ONE = "expected one specimen; upload them one by one"
+_ONE_BY_ONE = "expected one specimen: upload them one by one"
 
 
 def arrange(folder: str, limits: InboxLimits) -> str:
@@ -38,7 +38,7 @@ def arrange(folder: str, limits: InboxLimits) -> str:
     root = Path(folder)
     upload = Upload.open(root)
     if upload is None:
-        raise RefusedError(410, "the upload was deleted; upload the files again")
+        raise RefusedError(410, "the upload was deleted: upload the files again")
     for name in (SOURCE, _UNPACKED):
         shutil.rmtree(root / name, ignore_errors=True)
     names = upload.announced.parts

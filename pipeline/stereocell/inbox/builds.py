@@ -114,6 +114,6 @@ def _require_room(inbox: Inbox, item: Item) -> None:
     if needed > free:
         raise RefusedError(
             507,
-            f"the server's disk has {max(0, free):,} bytes free; this build needs about "
-            f"{needed:,}. Delete some items, then build it again.",
+            f"the server's disk has {max(0, free):,} bytes free, expected about {needed:,} for "
+            "this build: delete some items, then build it again",
         )

@@ -52,13 +52,13 @@ class Inbox:
         """Set the state from which an item continues after a restart of the server."""
         shutil.rmtree(item.view_folder, ignore_errors=True)
         if item.doing == "built" and not (item.out / "bundle" / "manifest.json").exists():
-            self._fail(item, "the build was deleted; upload the files again")
+            self._fail(item, "the build is missing: upload the files again")
         elif item.doing == "built" and not item.keep_upload:
             self.remove_upload(item)  # the server ended before it could remove the upload
         elif item.doing in ("building", "paused"):
             item.doing = "queued"  # the item keeps its place, the first one
         if item.doing in ("uploading", *_BUSY, "understood", "queued") and item.upload is None:
-            self._fail(item, "the upload was deleted; upload the files again")
+            self._fail(item, "the upload was deleted: upload the files again")
 
     # --- items, by their state
 
@@ -128,7 +128,8 @@ class Inbox:
                     return item, False
             if len(self._items) >= self.limits.items:
                 raise RefusedError(
-                    429, f"the inbox is full with {len(self._items)} items; delete some"
+                    429,
+                    f"the inbox is full with {len(self._items)} items, expected fewer: delete some",
                 )
             self._require_room(announced.total)
             item_id = new_id()
@@ -153,8 +154,8 @@ class Inbox:
         if total > free:
             raise RefusedError(
                 507,
-                f"the server's disk has {max(0, free):,} bytes free; this upload needs {total:,}. "
-                "Delete some items.",
+                f"the server's disk has {max(0, free):,} bytes free, expected {total:,} for this "
+                "upload: delete some items",
             )
 
     @contextmanager
@@ -255,7 +256,7 @@ class Inbox:
         with self.changed:
             self._require(item, ("understood", "failed", "cancelled", "understanding"), "changed")
             if item.upload is None or (not item.source and not item.address):
-                raise RefusedError(409, "the upload is missing or damaged; upload the files again")
+                raise RefusedError(409, "the upload is missing or damaged: upload the files again")
             item.choices = parse_choices(content, item.choices)
             item.round += 1
             self.set(item, "understanding")
@@ -296,7 +297,7 @@ class Inbox:
 
     def _enqueue(self, item: Item) -> None:
         if item.upload is None:
-            raise RefusedError(409, "the upload was deleted; upload the files again")
+            raise RefusedError(409, "the upload was deleted: upload the files again")
         if item.build is not None:
             item.newest = item.build.state.folder or item.newest
             item.build = None

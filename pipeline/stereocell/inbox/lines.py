@@ -31,7 +31,7 @@ def line_of(item: Item, error: BaseException) -> str:
         return words
     if isinstance(error, OSError):
         return f"the server had an error: {error.strerror or type(error).__name__}"
-    return f"this is a bug of StereoCell ({type(error).__name__}); please report it"
+    return f"this is a bug of StereoCell ({type(error).__name__}): please report it"
 
 
 def without_identity(item: Item, text: str) -> str:

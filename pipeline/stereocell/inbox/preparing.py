@@ -132,7 +132,7 @@ def look(inbox: Inbox, item: Item, page: Path) -> str:
     if item.doing in ("uploading", "unpacking", "understanding") or not item.title:
         raise RefusedError(409, f"the item can't be viewed: its state is {item.doing}")
     if item.upload is None:
-        raise RefusedError(409, "the upload was deleted; upload the files again")
+        raise RefusedError(409, "the upload was deleted: upload the files again")
     with item.reading:
         if item.page:  # another request was first
             return item.page

@@ -100,7 +100,7 @@ def _checked_zip(
         if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
             raise _refused("a link or a device", "files and folders")
         if info.flag_bits & _ENCRYPTED:
-            raise _refused("members with a password", "none; unpack it and upload the files")
+            raise _refused("members with a password", "none: unpack it and upload the files")
     # zipfile cuts names at a NUL and replaces Windows' separators; the original name counts.
     if any(info.orig_filename != info.filename for info in infos):
         check_names([info.orig_filename.rstrip("/") for info in infos], "archive")
@@ -148,7 +148,8 @@ class _Allowance:
         if self._taken > self._most:
             raise RefusedError(
                 413,
-                f"archive: found more than {self._most:,} bytes in it; upload the files instead",
+                f"archive: found {self._taken:,} bytes or more in it, expected at most "
+                f"{self._most:,}: upload the files instead",
             )
 
     def copy(self, member: IO[bytes], target: Path) -> None:
@@ -184,12 +185,16 @@ def _whole() -> Iterator[None]:
     ) as error:
         if isinstance(error, RefusedError):
             raise
-        raise _refused("damage", "an undamaged archive; pack it again") from None
+        raise _refused("damage", "an undamaged archive: pack it again") from None
 
 
 def _require_count(count: int, limits: InboxLimits) -> None:
     if count > limits.files:
-        raise RefusedError(413, f"archive: found more than {limits.files:,} members; split it")
+        raise RefusedError(
+            413,
+            f"archive: found {count:,} members or more, expected at most {limits.files:,}: "
+            "split it",
+        )
 
 
 def _refused(found: str, expected: str) -> RefusedError:

@@ -78,7 +78,7 @@ def parse_announced(content: Any, limits: InboxLimits) -> Announced:
         raise RefusedError(400, "files: expected a list of names and sizes that is not empty")
     if len(files) > limits.files:
         raise RefusedError(
-            413, f"files: found {len(files):,}, expected at most {limits.files:,}; zip them"
+            413, f"files: found {len(files):,}, expected at most {limits.files:,}: zip them"
         )
     sizes = []
     for one in files:
@@ -192,8 +192,8 @@ class Upload:
 def not_written(error: OSError) -> RefusedError:
     """Return the refusal for a disk that takes no more bytes."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return RefusedError(507, "the server's disk is full; free space to continue the upload")
-    return RefusedError(507, f"the server can't write ({error.strerror}); inform its owner")
+        return RefusedError(507, "the server's disk is full: free space to continue the upload")
+    return RefusedError(507, f"the server can't write ({error.strerror}): inform its owner")
 
 
 def _starts_of(sizes: Sequence[int]) -> list[int]:

@@ -63,7 +63,7 @@ def parse_level(where: str, given: float | str) -> tuple[float, bool]:
     if not abs(value) <= MAX_VOXEL_VALUE or (plus and rest != "b"):
         raise UsageError(
             f"{where} is {given!r:.60}, expected a voxel value, or one above the "
-            "background as 162+b"
+            "background, such as 162+b"
         )
     return value, bool(plus)
 
@@ -192,19 +192,21 @@ class SurfaceOptions:
     min_diagonal_um: float | str = setting(
         AUTO,
         "smaller fragments are dropped; auto: body_um, or without it 3 coarsest spacings (at most "
-        "9 finest)",
+        f"9 finest), and at least {LEAST_COARSEST:g} coarsest",
         bounds=LENGTH_UM,
     )
     max_fragment_um: float | str = setting(
         AUTO,
         "fragments up to this size are dropped too if they have under half the mean diagonal or "
-        "triangles of the channel's components; auto: 6 coarsest spacings (at most 18 finest), and "
-        "at most twice body_um or a given min_diagonal_um; 0: none are",
+        "triangles of the channel's components; auto: 6 coarsest spacings (at most 18 finest), "
+        "at most twice body_um or a given min_diagonal_um, and at least "
+        f"{LEAST_COARSEST:g} coarsest; 0: none are",
         bounds=LENGTH_UM,
     )
     max_cavity_um: float | str = setting(
         AUTO,
-        "smaller cavities are filled; auto: 4 coarsest spacings (at most 12 finest)",
+        "smaller cavities are filled; auto: 4 coarsest spacings (at most 12 finest), and at least "
+        f"{LEAST_COARSEST:g} coarsest",
         bounds=LENGTH_UM,
     )
     wrap: str = setting(

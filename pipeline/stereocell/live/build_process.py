@@ -316,7 +316,10 @@ class _Watcher:
             folder = self._view.add(tile_id)
         except (StereoCellError, OSError) as error:
             self._has_failed = True
-            console.print(f"{error}. The page shows surfaces only at the end.", markup=False)
+            console.print(
+                f"views can't be written: {error}: the page shows surfaces only at the end",
+                markup=False,
+            )
             return
         if folder is not None:
             self._pipe.send(_View(folder, self._view.holders))

@@ -89,7 +89,7 @@ class FineTiles:
             return ""
         return (
             f"{self.plan.source}: changed since it was opened, expected a source that does not "
-            "change while it is shown. End the command and run it again."
+            "change while it is shown: end the command and run it again"
         )
 
     def _require_unchanged(self) -> None:

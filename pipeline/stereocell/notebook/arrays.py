@@ -76,7 +76,7 @@ def as_source(
     dims = tuple(str(dim).lower() for dim in getattr(array, "dims", ()))
     if dims and dims != tuple(axes):
         raise UsageError(
-            f"the array's axes are {', '.join(dims)}, expected {', '.join(axes)}. Transpose it."
+            f"the array's axes are {', '.join(dims)}, expected {', '.join(axes)}: transpose it"
         )
     if min(shape[-3:]) < _MIN_EDGE:
         raise UsageError(
@@ -90,14 +90,14 @@ def as_source(
     if prod(shape) > _MAX_READ:
         raise UsageError(
             f"the array has {prod(shape):,} voxels ({size}), expected at most {_MAX_READ:,} in a "
-            "notebook. Save it as OME-Zarr, run `stereocell build scan.ome.zarr -o out` and show "
-            "out, or show a part of the array."
+            "notebook: save it as OME-Zarr, run `stereocell build scan.ome.zarr -o out` and show "
+            "out, or show a part of the array"
         )
     found = spacing_um if spacing_um is not None else _spacing_of(array)
     if found is None:
         raise UsageError(
-            "the array states no voxel spacing; pass it as spacing_um=(0.5, 0.25, 0.25), for "
-            "(z, y, x)"
+            "the array states no voxel spacing, expected one: pass it as "
+            "spacing_um=(0.5, 0.25, 0.25), for (z, y, x)"
         )
     spacing = check_spacing(found)
     count = shape[0] if len(shape) == 4 else 1
@@ -133,12 +133,15 @@ def _spacing_of(array: Any) -> tuple[float, ...] | None:
         places = np.asarray(coordinate.data, float)
         step = float((places[-1] - places[0]) / (len(places) - 1))
         if not np.allclose(np.diff(places), step, rtol=1e-3):
-            raise UsageError(f"the array's coordinates along {axis} are uneven; pass spacing_um")
+            raise UsageError(
+                f"the array's coordinates along {axis} are uneven, expected even ones: pass "
+                "spacing_um"
+            )
         unit = coordinate.attrs.get("units", "um")
         um = um_per(unit)
         if um is None:
             raise UsageError(
-                f"the array's unit along {axis} is {unit!r:.40}, not a length; pass spacing_um"
+                f"the array's unit along {axis} is {unit!r:.40}, expected a length: pass spacing_um"
             )
         spacing.append(abs(step) * um)
     return tuple(spacing)

@@ -116,8 +116,8 @@ def _find_bundle(path: Path) -> tuple[Path, Path | None] | None:
         return path, None
     if (path / "plan.json").is_file():
         raise UsageError(
-            f"{path}: found a build without a bundle, expected {path / 'bundle' / _MANIFEST}. "
-            f"Run `stereocell bundle {shlex.quote(str(path))}` first."
+            f"{path}: found a build without a bundle, expected {path / 'bundle' / _MANIFEST}: "
+            f"run `stereocell bundle {shlex.quote(str(path))}` first"
         )
     return None
 

@@ -61,7 +61,9 @@ class ObjectOptions:
     columns: tuple[str, ...] = setting(
         (),
         "columns of the table that are read; empty: all, up to 128",
-        flag=Flag("--columns", "columns of the table that are read, as CD8,cell_type", "A,B,..."),
+        flag=Flag(
+            "--columns", "columns of the table that are read, such as CD8,cell_type", "A,B,..."
+        ),
     )
     segment_labels: bool = setting(
         False,

@@ -250,7 +250,7 @@ def painted(
     }
     for name, other in found.items():
         if name == other:
-            raise UsageError(f"--paint {name}={other}: expected another channel than its own")
+            raise UsageError(f"--paint is {name}={other}, expected another channel than its own")
     return found
 
 

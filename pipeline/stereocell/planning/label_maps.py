@@ -78,7 +78,9 @@ def find_labels(
     ids = [to_identifier(name).lower() for name in taken]
     for name, place in wanted.items():
         if not name.isprintable():
-            raise UsageError(f"--labels {name!r:.60}: expected a name without control characters")
+            raise UsageError(
+                f"--labels is {name!r:.60}, expected a name without control characters"
+            )
         opened = _opened(image, source, name, place, settings.plan)
         title = name
         if name == SELF:  # the file of a patient may bear the patient's name

@@ -186,4 +186,4 @@ def _advice(evidence: CtEvidence) -> str:
 def _describe(chosen: str | None, reason: str) -> tuple[str, ...]:
     if chosen is None:
         return (f"no preset: {reason}: lengths follow the voxel spacing (--preset names one)",)
-    return (f"preset {chosen}: {reason} (--preset {NO_PRESET} takes the defaults)",)
+    return (f"preset {chosen}: {reason} (or --preset {NO_PRESET} for the defaults)",)

@@ -72,9 +72,7 @@ def write_slices(plan: Plan, folder: Path, *, plane: str = ACQUIRED) -> Written:
     choose_view(views, dataset.acquired.axis, plane, dataset.shown)  # report a wrong plane first
     if len(plan.channels) != 1:
         found = ", ".join(channel.name for channel in plan.channels)
-        raise UsageError(
-            f"slices show one channel, found {found}; choose one of them by --channels"
-        )
+        raise UsageError(f"slices: found channels {found}, expected one: choose it by --channels")
     _require_own(folder, plan)
     cut = cut_planes(dataset, plan, channel.index, plane)
     window = window_step(plan, channel).run().statistics.window

@@ -13,6 +13,5 @@ def require_installed(library: str, extra: str, where: str, title: str) -> None:
         is_there = False
     if not is_there:
         raise SourceError(
-            f"{where}: the library for {title} is not installed, expected it. Install it with: "
-            f'pip install "stereocell[{extra}]"'
+            f'{where}: the library for {title} is not installed: pip install "stereocell[{extra}]"'
         )

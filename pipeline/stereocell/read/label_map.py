@@ -94,6 +94,6 @@ def _not_whole(numbers: NDArray[np.floating], stored: np.dtype[np.floating]) -> 
         return f"found {float(numbers[0]):g}, expected whole numbers in labels"
     return (
         f"found {float(large[0]):.0f} in {stored.name}, which rounds whole numbers beyond "
-        f"{int(_MAX_EXACT):,}, so objects with neighbouring numbers would merge: expected labels "
+        f"{int(_MAX_EXACT):,}, so objects with neighbouring numbers would merge, expected labels "
         "saved as int64 or uint64"
     )

@@ -61,7 +61,7 @@ def open(
         volume = dataset.read(0, Box((0, 0, 0), (64, 64, 64)))
     """
     location, format = find_reader(source)
-    with library_boundary(location.shown, f"{format.short_title} that is whole"):
+    with library_boundary(location.shown, f"a complete source ({format.short_title})"):
         with collected() as repeats:
             image = read_image(location, format, series=series, pattern=pattern, axes=axes)
         notes = (note for _, note in sorted(repeats.items()))

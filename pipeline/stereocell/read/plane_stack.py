@@ -143,15 +143,13 @@ def lay_out(
     local = (positions - positions[0]) @ axes.T  # mm along (normal, down, across)
     gaps = np.diff(local[:, 0])
     if gaps.min() <= SAME_PLACE * min(pixel_spacing_mm):
-        raise NoStackError(
-            "slices lie side by side in one plane, expected slices on top of each other"
-        )
+        raise NoStackError("slices lie side by side in one plane, not on top of each other")
     count, is_even = _count_planes(gaps)
     lost = count - len(positions)
     if lost > len(positions):
         raise NoStackError(
             f"{lost} of {count} slices {agreeing(lost, 'is', 'are')} missing (gaps of "
-            f"{gaps.min():.4g} to {gaps.max():.4g} mm), expected fewer missing slices than present"
+            f"{gaps.min():.4g} to {gaps.max():.4g} mm)"
         )
     spacing = local[-1, 0] / (count - 1)
     places = local / np.array([spacing, *pixel_spacing_mm])

@@ -112,7 +112,7 @@ def list_series(source: str | Path) -> tuple[str, ...]:
     if format.list_series is None:
         raise _not_taken(location, format, "series", "list")
     format.require_library(location)
-    with library_boundary(location.shown, f"{format.short_title} that is whole"):
+    with library_boundary(location.shown, f"a complete source ({format.short_title})"):
         return format.list_series(location)
 
 

@@ -127,7 +127,7 @@ def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> t
         if len(given_um) != 3 or not all(_is_length(value) for value in given_um):
             text = ",".join(f"{value:g}" for value in given_um)
             raise UsageError(
-                f"--spacing-um: found {text}, expected z,y,x in um, each above 0, up to 1e9"
+                f"--spacing-um is {text}, expected z,y,x in um, each above 0, up to 1e9"
             )
         finest = given_um
         grids = tuple(grid if _is_sound(grid) else Grid(grid.shape) for grid in grids)

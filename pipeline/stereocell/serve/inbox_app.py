@@ -106,7 +106,7 @@ class InboxApp:
         method, path = request.method, request.scope["path"]
         is_read = method in ("GET", "HEAD")
         if not is_read and not _may_upload(request.scope):
-            raise RefusedError(403, "this session may only look; scan the code for uploading")
+            raise RefusedError(403, "this session may only look: scan the code for uploading")
         if path == "/items" and method == "POST":
             return await self._announce(request)
         if not path.startswith("/items"):
@@ -174,7 +174,7 @@ class InboxApp:
 
     async def _send_offset(self, _: Request, item: Item) -> Response:
         if item.upload is None:
-            raise RefusedError(410, "the upload was deleted; upload the files again")
+            raise RefusedError(410, "the upload was deleted: upload the files again")
         return Response(headers={**_HEADERS, _OFFSET: str(item.upload.offset)})
 
     async def _delete(self, _: Request, item: Item) -> Response:
@@ -237,7 +237,7 @@ class InboxApp:
     def _view_of(self, item: Item) -> ASGIApp:
         """Return the application of an item's view. Raises RefusedError if there is no view."""
         if not item.has_view:
-            raise RefusedError(404, "this item has no view yet; press Look in the inbox")
+            raise RefusedError(404, "this item has no view yet: press Look in the inbox")
         known = self._views.get(item.id)
         if known is None or known[0] is not item.live:
             live = item.live

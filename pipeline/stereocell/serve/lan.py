@@ -37,7 +37,8 @@ def find_addresses() -> list[str]:
     addresses = [a for a in dict.fromkeys(found) if not a.startswith("127.") and a != "0.0.0.0"]
     if not addresses:
         raise StereoCellError(
-            "--lan: this machine has no address on a network; connect it to one, or omit --lan"
+            "--lan: this machine has no address on a network, expected one: connect it, or "
+            "omit --lan"
         )
     return addresses
 

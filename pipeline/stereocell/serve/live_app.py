@@ -143,7 +143,7 @@ class LiveApp:
             try:
                 await asyncio.shield(asyncio.wrap_future(self._live.first))
             except StereoCellError:  # the command prints the error and ends
-                return PlainTextResponse("the source can't be shown; see the terminal", 503)
+                return PlainTextResponse("the source can't be shown: see the terminal", 503)
         library = self._library(folder) if path == MANIFEST else None
         if library is not None and library.has_finer():
             headers = headers | bricks_header("" if folder is None else f"{folder.name}/")

@@ -242,8 +242,8 @@ class BundleServer(Server):
         for name in (MANIFEST, "index.html"):
             if live is None and not (bundle / name).is_file():
                 raise StereoCellError(
-                    f"{bundle / name}: not found, expected a built bundle. "
-                    "Run `stereocell bundle OUT` to write it."
+                    f"{bundle / name}: not found, expected a built bundle: run "
+                    "`stereocell bundle OUT` to write it"
                 )
 
         def make(names: tuple[str, ...], gate: Gate | None) -> ASGIApp:
@@ -292,7 +292,7 @@ def _bind(host: str, port: int) -> socket.socket:
         listener.listen(128)
     except (OSError, OverflowError) as error:
         listener.close()
-        reason = error.strerror if isinstance(error, OSError) else error
+        reason = (error.strerror or error) if isinstance(error, OSError) else error
         raise StereoCellError(
             f"port {port}: {reason}; choose another by --port, or --port 0 for a free one"
         ) from error

@@ -211,8 +211,8 @@ class TreeFiles:
                 self._remove(name)
             if sum(self._bytes.values()) + wanted > most:
                 raise FullError(
-                    f"{self._folder}: a tree of {wanted:,} bytes does not fit; all trees in view "
-                    f"may take {most:,} together. This volume stays coarse."
+                    f"{self._folder}: a tree of {wanted:,} bytes does not fit, expected at most "
+                    f"{most:,} for all trees in view: this volume stays coarse"
                 )
 
     def _remove_others(self, names: Collection[str]) -> None:

@@ -105,7 +105,7 @@ def one_line(
             raise raised(
                 f"{where}: {damage_words(error)}, expected {expected}: {_AGAIN}"
             ) from error
-        raise raised(f"{where}: {_reason(error)}, expected {expected}") from error
+        raise raised(f"{where}: {_reason(error)}, expected {expected}{_remedy(error)}") from error
 
 
 @contextmanager
@@ -202,17 +202,25 @@ def _reason(error: BaseException) -> str:
         return f"metadata: {error}" if is_json else f"metadata: found {content.words}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
-    if "support range requests" in str(error):  # fsspec's text is for programmers
-        return (
-            "the host does not send parts of files: ask its operator to turn on range requests, or "
-            "download the file first"
-        )
+    if _needs_ranges(error):
+        return "the host does not send parts of files"
     if isinstance(error, TimeoutError):  # aiohttp's error has a text only for a silent host
         is_silence = bool(str(error))
         return f"did not answer {f'within {location.SILENCE_S:g} s' if is_silence else 'in time'}"
     if not str(error):
         return f"its content can't be decoded ({_library_of(error)} raised {type(error).__name__})"
     return _shortened(str(error))
+
+
+def _remedy(error: BaseException) -> str:
+    """Return the remedy for a library's error, after a colon; empty: none is known."""
+    if _needs_ranges(error):
+        return ": ask its operator to turn on range requests, or download the file first"
+    return ""
+
+
+def _needs_ranges(error: BaseException) -> bool:
+    return "support range requests" in str(error)  # fsspec's text is for programmers
 
 
 def _shortened(text: str) -> str:

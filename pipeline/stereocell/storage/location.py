@@ -52,7 +52,7 @@ class Location:
         text = str(source)
         if not text:
             raise UsageError(
-                "found an empty name, expected a path or an address (. is the current folder)"
+                "path: found an empty name, expected a path or an address (. is the current folder)"
             )
         if not _ADDRESS.match(text):
             path, inside = _split(os.path.expanduser(text))
@@ -198,7 +198,8 @@ def require_own(
     real = os.path.realpath(path)
     if not is_own(real, folders):
         raise raised(
-            f"{named}: leads to {real}, expected a file in {folders[0]} or below (links followed)"
+            f"{named}: leads to {real}, expected a file in {folders[0]} or below (links are "
+            "followed)"
         )
     try:
         status = os.stat(real)

@@ -43,7 +43,7 @@ def find_foreground(smooth: NDArray[np.float32]) -> Mask:
     Raises SourceError for a constant volume.
     """
     if smooth.min() == smooth.max():
-        raise SourceError(f"every voxel is {smooth.flat[0]:g}: expected tissue of several kinds")
+        raise SourceError(f"every voxel is {smooth.flat[0]:g}, expected tissue of several kinds")
     sample = smooth[::2, ::2, ::2]
     values = np.log1p(np.maximum(sample - np.percentile(sample, 1), 0))
     level = np.expm1(float(threshold_otsu(values))) + np.percentile(sample, 1)

@@ -27,7 +27,7 @@ def parse_window(where: str, text: str) -> tuple[float, float]:
         ends = (0.0, 0.0)
     if not colon or not all(abs(end) <= MAX_VOXEL_VALUE for end in ends) or not ends[0] < ends[1]:
         raise UsageError(
-            f"{where} is {text!r:.60}, expected LOW:HIGH in voxel values, as -160:240, or one of "
-            f"{', '.join(NAMED)} (CT)"
+            f"{where} is {text!r:.60}, expected LOW:HIGH in voxel values, such as -160:240, or one "
+            f"of {', '.join(NAMED)} (CT)"
         )
     return ends

@@ -204,7 +204,7 @@ class _Finder:
             return LostEdit(
                 f"variant {opinion.variant} on {prim.GetPath()}",
                 "variant",
-                "its layer does not list the set: write prepend variantSets there"
+                "its layer does not list the set: write `prepend variantSets` there"
                 if opinion.is_unlisted
                 else "it is not selected",
             )

@@ -37,7 +37,7 @@ def note_on_source(stage: Usd.Stage, built: Path) -> str:
         return ""
     return (
         f"{stage.GetRootLayer().realPath}: shows another specimen (fingerprint {found[0][:12]}) "
-        f"than {built} ({expected[:12]}): the bundle shows that of the layer"
+        f"than {built} ({expected[:12]}): the bundle shows the layer's specimen"
     )
 
 

@@ -205,7 +205,7 @@ def _token_for(root: str, shown: str) -> str:
         return token
     if any(not _is_loopback(number) for number in numbers_of(root)):
         raise UsageError(
-            f"{shown}: {TOKEN} is set, but http:// would show it to others on the way: expected "
+            f"{shown}: {TOKEN} is set, but http:// would show it to others on the way, expected "
             "https://, or no token"
         )
     return token

@@ -67,7 +67,7 @@ def _container_of(location: Location) -> Location:
         named = container_of(location.path)
     if named is None:
         raise SourceError(
-            f"{where}: ImageLoader: found no HDF5 or N5 file, expected one beside the XML; name "
+            f"{where}: ImageLoader: found no HDF5 or N5 file, expected one beside the XML: name "
             "the image files themselves, or save them again as HDF5 in BigStitcher"
         )
     path = os.path.join(os.path.dirname(os.path.realpath(location.path)), named)

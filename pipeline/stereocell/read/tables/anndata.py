@@ -224,12 +224,15 @@ def _fill(
     lines = len(made) if by_row else genes
     if pointer.shape != (lines + 1,) or data.shape is None or data.shape != indices.shape:
         raise SourceError(
-            f"{where}: X: found parts of unequal lengths, expected those of a sparse matrix"
+            f"{where}: X: found parts whose lengths don't fit, expected those of a sparse matrix"
         )
     begins = np.asarray(pointer.read(...), np.int64)
     count = data.shape[0]
     if begins[0] != 0 or begins[-1] != count or (np.diff(begins) < 0).any():
-        raise SourceError(f"{where}: X/indptr: expected rising numbers from 0 to {count}")
+        raise SourceError(
+            f"{where}: X/indptr: found numbers that don't rise from 0 to {count}, expected those "
+            "of a sparse matrix"
+        )
     column = np.full(genes, -1)
     column[places] = np.arange(len(places))
     for start in range(0, count, _BLOCK):

@@ -29,7 +29,7 @@ refusal = refusing(read.open)
         ("104.1", "an encapsulated document holds no image"),
         ("104.3", "an encapsulated mesh holds no voxels"),
         ("9.1.1", "a waveform is not an image"),
-        ("11.1", "a presentation state states how to show other images"),
+        ("11.1", "a presentation state describes how to show other images"),
         ("66.1", "describes other images"),
     ],
 )

@@ -57,7 +57,8 @@ def _slice_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, ...
     count = len(frames)
     if not stated or count in stated or count + layout.missing in stated:
         return ()
-    words = f"number of slices: NumberOfSlices states {stated[0]}, but there are {count}"
+    are = agreeing(count, "is", "are")
+    words = f"number of slices: NumberOfSlices states {stated[0]}, but there {are} {count}"
     if count > stated[0]:
         return (f"{words}: all of them are read",)
     return (

@@ -184,7 +184,7 @@ def _label_map(found: Found, stack: Stack, series: int, shown: str) -> Image:
 
 def _no_labels(stack: Stack, stacks: int, shown: str, problem: str) -> UsageError:
     return UsageError(
-        f"{shown}: this is a label map: found {_labels(stack, stacks)}, {problem}; {_INSTEAD}, or "
+        f"{shown}: this is a label map: found {_labels(stack, stacks)}, {problem}, {_INSTEAD}, or "
         "a mask by --series N --as intensity"
     )
 
@@ -262,7 +262,7 @@ def _find(location: Location) -> Found:
         if not root.is_dir():
             held = f"one file, {next(iter(left_out), 'which is not DICOM')}"
         if left_out and all(reason.startswith(SEGMENTATION) for reason in left_out):
-            raise UsageError(f"{location.shown}: this is a label map: found {held}; {_INSTEAD}")
+            raise UsageError(f"{location.shown}: this is a label map: found {held}, {_INSTEAD}")
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if files and root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "

@@ -40,7 +40,8 @@ _CLASSES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"Waveform|ECG", f"a waveform is not an image: {_IMAGES}"),
         (
             r"Presentation State",
-            f"a presentation state states how to show other images: {_IMAGES} that it belongs to",
+            f"a presentation state describes how to show other images: {_IMAGES} that it "
+            "belongs to",
         ),
         (
             r"Registration|Fiducials|Real World Value Mapping|Raw Data|Measurements|Tractography",

@@ -145,10 +145,10 @@ def _level(tree: Hdf5Tree, level: int, times: int, channels: int) -> VoxelArray:
     def find(time: int, channel: int) -> Hdf5Array:
         path = f"/DataSet/ResolutionLevel {level}/TimePoint {time}/Channel {channel}/Data"
         node = tree.find(path)
-        if not isinstance(node, h5py.Dataset) or len(node.shape or ()) != 3:
-            raise SourceError(
-                f"{tree.where}: {path}: found no dataset, expected one with axes z, y, x"
-            )
+        shape = node.shape or () if isinstance(node, h5py.Dataset) else None
+        if shape is None or len(shape) != 3:
+            held = "no dataset" if shape is None else f"a dataset of shape {shape}"
+            raise SourceError(f"{tree.where}: {path}: found {held}, expected one with axes z, y, x")
         return Hdf5Array(node, f"{tree.where}: {path}")
 
     first = find(0, 0)

@@ -44,14 +44,14 @@ def unpack_block(
     mode, dimensions = struct.unpack_from(">HH", content)
     if mode != 0 or dimensions != len(most):
         raise OSError(
-            f"found a block of mode {mode} with {dimensions} dimensions, not of mode 0 with "
-            f"{len(most)}"
+            f"found a block of mode {mode} with {dimensions} dimensions, expected mode 0 "
+            f"with {len(most)}"
         )
     shape = struct.unpack_from(f">{dimensions}I", content, 4)[::-1]
     if any(n > m for n, m in zip(shape, most, strict=True)):
-        raise OSError(f"found a block of {shape} voxels, more than {tuple(most)}")
+        raise OSError(f"found a block of {shape} voxels, expected at most {tuple(most)}")
     if any(n < m for n, m in zip(shape, least, strict=True)):
-        raise OSError(f"found a block of {shape} voxels, fewer than {tuple(least)}")
+        raise OSError(f"found a block of {shape} voxels, expected at least {tuple(least)}")
     size = math.prod(shape) * dtype.itemsize
     found = _unpack(content[4 + 4 * dimensions :], size, packing)
     if len(found) < size:
@@ -72,18 +72,23 @@ def _unpack(data: bytes, size: int, packing: Mapping[str, Any]) -> bytes:
     if kind == "blosc":
         *_, unpacked, _, packed = _BLOSC_HEADER.unpack_from(data)
         if unpacked > size or packed > len(data):
-            raise OSError(f"found a block of {unpacked} bytes, not {size}, or cut short")
+            raise OSError(
+                f"found a block of {unpacked} bytes packed in {packed}, expected at most {size} in "
+                f"{len(data)}"
+            )
         return bytes(blosc.decompress(data))
     if kind == "lz4":
         return _unpack_lz4(data, size)
-    raise OSError(f"compression: found {kind!r:.40}, not raw, gzip, bzip2, xz, zstd, blosc or lz4")
+    raise OSError(
+        f"compression: found {kind!r:.40}, expected raw, gzip, bzip2, xz, zstd, blosc or lz4"
+    )
 
 
 def _unpack_zstd(data: bytes, size: int) -> bytes:
     """Return the content of a frame, whose size may not be stated: Java's streams don't."""
     stated: int = zstandard.get_frame_parameters(data).content_size
     if size < stated < _ZSTD_UNKNOWN:
-        raise OSError(f"found a block of {stated} bytes, not {size}")
+        raise OSError(f"found a block of {stated} bytes, expected {size}")
     if stated < _ZSTD_UNKNOWN:
         return zstandard.ZstdDecompressor().decompress(data)
     return zstandard.ZstdDecompressor().stream_reader(data).read(size + _MOST_BEHIND)

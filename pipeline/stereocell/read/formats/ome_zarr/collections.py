@@ -117,40 +117,46 @@ def image_of_level(location: Location) -> str:
     return image.shown if is_level else ""
 
 
-def describe_group(ome: Mapping[str, Any], series: Sequence[str], tree: ZarrTree) -> str:
-    """Return what a group without an image of its own holds, and how to open a part of it."""
+def describe_group(
+    ome: Mapping[str, Any], series: Sequence[str], tree: ZarrTree
+) -> tuple[str, str]:
+    """Return what a group without an image of its own holds, and how to open a part of it.
+
+    The second text is empty if no part can be opened.
+    """
     shown = tree.location.shown.rstrip("/")
     if "plate" in ome:
         wells = _paths(ome["plate"], "wells")
         if not wells:
-            return "found a plate without wells"
+            return "a plate without wells", ""
         fields = _paths(tree.attributes(wells[0]).get("well"), "images")
         return (
-            f"found a plate of {_counted(wells, 'well')}; open an image of a well by its path, "
-            f"such as {shown}/{_cut(wells[0])}/{_cut(fields[0]) if fields else '0'}"
+            f"a plate of {_counted(wells, 'well')}",
+            "open an image of a well by its path, such as "
+            f"{shown}/{_cut(wells[0])}/{_cut(fields[0]) if fields else '0'}",
         )
     if "well" in ome:
         fields = _paths(ome["well"], "images")
         if not fields:
-            return "found a well without images"
+            return "a well without images", ""
         return (
-            f"found a well of {_counted(fields, 'image')}; open one by its path, such as "
-            f"{shown}/{_cut(fields[0])}"
+            f"a well of {_counted(fields, 'image')}",
+            f"open one by its path, such as {shown}/{_cut(fields[0])}",
         )
     if CONTAINER in ome:
         if not series:
-            return f"found a container of series ({CONTAINER}) without an image"
+            return f"a container of series ({CONTAINER}) without an image", ""
         return (
-            f"found {_counted(series, 'image')} in one container ({CONTAINER}); open one by its "
-            f"path, such as {shown}/{_cut(series[0])}"
+            f"{_counted(series, 'image')} in one container ({CONTAINER})",
+            f"open one by its path, such as {shown}/{_cut(series[0])}",
         )
     if "labels" in ome:
         names = [str(name) for name in ome["labels"]] if isinstance(ome["labels"], list) else []
-        return f"found a list of labels, {_counted(names, 'label image')}"
+        return f"a list of labels, {_counted(names, 'label image')}", ""
     groups = _groups_below(tree)
     if groups:
-        return f"found {_counted(groups, 'group')}; open an image by its path: {shown}/PATH"
-    return "not found"
+        return _counted(groups, "group"), f"open an image by its path: {shown}/PATH"
+    return "no multiscales", ""
 
 
 def notes_on_labels(tree: ZarrTree) -> tuple[str, ...]:

@@ -170,9 +170,10 @@ def _read(
             only = bare_zarr.read_only_array(location, store, node, axes=axes)
             if only is not None:
                 return only, None
+        held, remedy = describe_group(ome, series, tree)
         raise SourceError(
-            f"{where}: no multiscales: {describe_group(ome, series, tree)}, expected the "
-            "attribute `multiscales` of an image"
+            f"{where}: found {held}, expected the attribute `multiscales` of an image"
+            + (f": {remedy}" if remedy else "")
         )
     converted = converted_of(location)
     one = {**ome, "multiscales": [multiscales[index]]}

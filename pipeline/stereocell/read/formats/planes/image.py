@@ -58,7 +58,7 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
         raise SourceError(
             f"{where}: found {len(listed)} images whose names don't show a volume, such as "
             f"{listed[0]!r:.100} and {listed[-1]!r:.100}, expected names with numbers or words "
-            "for planes or channels; name one of the files, choose by --series (`--series list` "
+            "for planes or channels: name one of the files, choose by --series (`--series list` "
             "shows them), or describe the names by --pattern"
         )
     if len(groups) > 1:
@@ -132,7 +132,7 @@ def _places(
     if 2 * len(places) < len(paths):
         raise SourceError(
             f"{location.shown}: found {len(paths)} images, of which {len(places)} are named "
-            f"alike, such as {places[0].path!r:.100}, expected one way of naming; name one of the "
+            f"alike, such as {places[0].path!r:.100}, expected one way of naming: name one of the "
             "files, or describe the names by --pattern"
         )
     if len(places) < len(paths):

@@ -2,7 +2,7 @@
 
 import os
 
-from stereocell.model.counted import counted
+from stereocell.model.counted import agreeing, counted
 from stereocell.read.formats.planes.endings import BMP, JPEG, PNG, TIFF
 from stereocell.read.formats.planes.files import join
 from stereocell.storage.location import Location, require_own
@@ -44,8 +44,10 @@ def of_one_kind(found: list[str]) -> tuple[list[str], list[str]]:
     }
     kind = max(by_kind, key=lambda one: len(by_kind[one]))  # the first of equally common ones
     if len(by_kind[kind]) < len(paths):
+        count = len(by_kind[kind])
         notes.append(
-            f"images of several kinds: {len(by_kind[kind])} {kind} are read, "
+            f"images of several kinds: {counted(count, kind, kind)} "
+            f"{agreeing(count, 'is', 'are')} read, "
             f"{counted(len(paths) - len(by_kind[kind]), 'other')} left out"
         )
     paths = by_kind[kind]

@@ -81,8 +81,8 @@ def companion_of(location: Location, root: ElementTree.Element) -> Described | N
         raise SourceError(f"{named}: not found, expected it beside the TIFF file")
     if name.lower().endswith(SUFFIXES):
         raise SourceError(
-            f"{named}: found another TIFF file that holds the set's OME-XML, expected that file: "
-            "open it in place of this one"
+            f"{named}: found a TIFF file as the companion, expected this set to be opened by that "
+            "file"
         )
     found = companion_at(path, named)
     stated = found.root.get("UUID", "")
