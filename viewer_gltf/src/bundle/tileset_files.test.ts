@@ -22,8 +22,12 @@ describe("a surface's file", () => {
 
   it("is not a host's error page", () => {
     const page = new TextEncoder().encode("<!doctype html><title>Oops</title>");
-    expect(() => checkGlb(page, PATH)).toThrow(`${PATH}: found another kind of file, expected a glb surface`);
-    expect(() => checkGlb(new Uint8Array(), PATH)).toThrow(`${PATH}: found another kind of file, expected a glb surface`);
+    expect(() => checkGlb(page, PATH)).toThrow(
+      `${PATH}: found another kind of file, expected a glb surface`,
+    );
+    expect(() => checkGlb(new Uint8Array(), PATH)).toThrow(
+      `${PATH}: found another kind of file, expected a glb surface`,
+    );
   });
 });
 
