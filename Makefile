@@ -236,8 +236,8 @@ test-python: setup
 	OPENBLAS_NUM_THREADS=1 STEREOCELL_MESSAGES=out/messages.md $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
 
 # CI has no time to run all tests with two versions of Python. The newest version therefore gets a
-# selection: files read and written by libraries, a full disk, and a build and an export to .glb by the
-# installed wheel. pyenv's Python is found even if pyenv has not activated it.
+# selection: files read and written by libraries, a full disk, and a build and an export by the installed
+# wheel. The Python of pyenv is found even if pyenv has not activated it.
 NEWEST := 3.13
 test-newest: setup ## A few tests with Python 3.13, where it is installed (all: make test PYTHON=python3.13)
 	@for each in python$(NEWEST) "$${PYENV_ROOT:-$$HOME/.pyenv}"/versions/$(NEWEST).*/bin/python$(NEWEST); do \

@@ -260,11 +260,11 @@ def print_inner(cases: list[Figures]) -> None:
     within = [case for case in cases if case.rung]
     missed = [case.name for case in within if case.rungs <= case.rung]
     judged = [(c.confidence, c.found[OURS].dice) for c in within if c.name not in missed]
-    print_confidence("an inner rung", judged)
-    print(f"\ninner rungs that are missed: {len(missed)} of {len(within)} {missed}")
+    print_confidence("an inner level", judged)
+    print(f"\ninner levels that are missed: {len(missed)} of {len(within)} {missed}")
     alike = [case for case in cases if ", x 1," in case.name]  # bodies of equal brightness
     further = sum(max(0, case.rungs - 1) for case in alike)
-    print(f"further rungs on {len(alike)} volumes whose bodies are all alike: {further}")
+    print(f"further levels on {len(alike)} volumes whose bodies are all alike: {further}")
 
 
 def print_looks(cases: list[Figures]) -> None:

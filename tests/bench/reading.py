@@ -223,8 +223,8 @@ def print_whole(
             (windows, SURVEY_VOXELS + under_blocks(REGION, CHUNK)),
         )
     )
-    print(f"  of {' x '.join(map(str, REGION.shape))} voxels, {voxel:.2f} bytes each as stored, in "
-          f"chunks of {' x '.join(map(str, CHUNK))}, {CHANNELS} channels: {units / 1e12:.2f} TB "
+    print(f"  {' x '.join(map(str, REGION.shape))} voxels, {voxel:.2f} bytes each as stored, in "
+          f"chunks of {' x '.join(map(str, CHUNK))}; {CHANNELS} channels; {units / 1e12:.2f} TB "
           f"read by units ({around / own:.2f} x their windows), {isos / 1e12:.2f} TB for "
           f"iso-values ({boxes / math.prod(REGION.shape):.2f} x the dataset), "
           f"{displays / 1e12:.3f} TB for windows, where there are coarse levels")  # fmt: skip

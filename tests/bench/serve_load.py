@@ -165,7 +165,7 @@ def main() -> int:
     print(f"{options.clients} clients, {s:g} s: {views:,} views ({views / s:.0f} a second),")
     print(f"{totals.cancelled:,} of them cancelled; {totals.bricks:,} bricks,")
     print(f"{totals.bytes / 1e6:,.0f} MB ({totals.bytes / 1e6 / s:.0f} MB a second),")
-    print(f"{totals.checked:,} bricks held against their hashes")
+    print(f"{totals.checked:,} bricks compared with their hashes")
     for name, times in (("first brick", totals.first_s), ("whole view", totals.view_s)):
         half, most = np.percentile(times, (50, 95))
         print(f"{name}: median {half * 1e3:.0f} ms, 95 % within {most * 1e3:.0f} ms")

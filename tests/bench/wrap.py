@@ -212,7 +212,7 @@ def compare(given: Input, binary: Path, rounds: int, folder: Path) -> None:
         target = Nearest(mesh, SAMPLES)
         there, back = measure_spread(reference, target), measure_spread(target, everything)
         print(
-            f"  {label:<14} {took:7.2f} s  {len(mesh.triangles):8d} faces  iso to mesh "
+            f"  {label:<14} {took:7.2f} s | {len(mesh.triangles):8d} faces | iso to mesh "
             f"{there.mean:.3f} / {there.p95:.3f} / {there.max:.2f}  mesh to iso "
             f"{back.mean:.3f} / {back.p95:.3f} / {back.max:.2f} um (mean / p95 / max)  "
             f"{measure_enclosure(reference, target):.0%} enclosed  "

@@ -1,7 +1,7 @@
 """Properties that hold for all inputs of a kind: plans, names, bricks, KTX2 and OpenVDB files.
 
-Deterministic (derandomize), so that a failure in CI is one here. What is held by the modules' own
-tests (tilings, legality of identifiers, min-max bricks, trees) is not repeated.
+The examples are the same in each run, so that a failure in CI can be repeated here. Tilings, legal
+identifiers, min-max bricks and trees are tested beside their modules.
 """
 
 import json

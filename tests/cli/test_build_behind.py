@@ -24,7 +24,7 @@ def handler(options: argparse.Namespace) -> None:
     """Stand in for the handler of `build`."""
 
 
-def test_what_the_page_has_fetched_is_not_fetched_again(
+def test_data_that_the_page_has_fetched_are_not_fetched_again(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     asked: list[str] = []

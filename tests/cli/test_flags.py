@@ -12,7 +12,7 @@ from stereocell.model.errors import UsageError
 from stereocell.model.settings import Flag, setting
 from stereocell.planning.settings import Settings, apply
 
-# what a person types, and the setting that it has to become
+# words that a person types, and the setting that they have to become
 TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--level": (["2"], "plan", "level", 2),
     "--channels": (["CD31, 2"], "plan", "channels", ("CD31", "2")),
@@ -112,7 +112,9 @@ def test_a_length_or_auto_can_have_a_flag(capsys: pytest.CaptureFixture[str]) ->
         (["--paint", "a="], "--paint is 'a=', expected CHANNEL=CHANNEL, such as CD31=MART1"),
     ],
 )
-def test_what_is_no_setting_is_told_by_its_flag(words: list[str], message: str) -> None:
+def test_a_value_that_is_not_valid_is_refused_under_the_name_of_its_flag(
+    words: list[str], message: str
+) -> None:
     with pytest.raises(UsageError) as raised:
         parser().parse_args(["in.tif", *words])
     assert message in str(raised.value)
@@ -130,7 +132,7 @@ def test_what_is_no_setting_is_told_by_its_flag(words: list[str], message: str) 
     ],
     ids=" ".join,
 )
-def test_an_empty_name_is_not_the_folder_in_which_one_is(words: list[str]) -> None:
-    """It is a variable that a script has not set."""
+def test_an_empty_name_does_not_stand_for_the_current_folder(words: list[str]) -> None:
+    """Scripts give an empty name if they have not set a variable."""
     with pytest.raises(UsageError, match="is empty, perhaps because a variable is not set"):
         _parser().parse_args(words)

@@ -6,9 +6,11 @@ CLONES is a folder with a clone of each repository in the table below, in folder
 folder napari-cellseg3d has the unpacked wheel of that package. OUT is `level_corpus` in the folder
 that STEREOCELL_DATA names.
 
-A truth is found in one of four ways. It is a label map that belongs to the volume, a watershed of
-the slope from two markers, the voxels far above the noise of the air, or the voxels above the
-Hounsfield units of skin.
+A truth is found in one of four ways:
+- a label map that belongs to the volume
+- a watershed of the slope from two markers
+- the voxels far above the noise of the air
+- the voxels above the Hounsfield units of skin
 """
 
 import argparse

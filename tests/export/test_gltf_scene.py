@@ -249,7 +249,7 @@ def test_khronos_validator_finds_no_error_and_three_opens_it(
 ) -> None:
     node = shutil.which("node")
     if node is None or not (VIEWER / "node_modules" / "gltf-validator").is_dir():
-        pytest.skip("gltf-validator is not at hand: make setup")
+        pytest.skip("gltf-validator is not installed: make setup")
     for name, options in (
         ("a.glb", ExportOptions(occlusion=True)), ("a.gltf", ExportOptions()),
         ("meshopt.glb", ExportOptions(compress="meshopt")),

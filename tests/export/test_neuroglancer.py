@@ -208,7 +208,9 @@ def test_neuroglancer_draws_image_and_mesh(folder: Path, tmp_path: Path) -> None
     neuroglancer = pytest.importorskip("neuroglancer")
     node, chromium = shutil.which("node"), os.environ.get("CHROMIUM") or shutil.which("chromium")
     if not (node and chromium and (VIEWER / "node_modules" / "playwright-core").is_dir()):
-        pytest.skip("node, chromium and the viewer's packages are not at hand: make setup browser")
+        pytest.skip(
+            "node, chromium and the viewer's packages are not installed: make setup browser"
+        )
     with served(folder) as url:
         viewer = neuroglancer.Viewer()
         with viewer.txn() as state:

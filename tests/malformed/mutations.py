@@ -1,8 +1,12 @@
 """Small changes of files, by seeds: a seed gives the same bytes each time.
 
 Only truncations, and edits of text files, change a file's length. Each kind stands for one cause of
-damage: a bit of memory or of a disk flips, a copy stops, a sector is lost, blocks are written in
-the wrong place, another program writes a field wrongly.
+damage:
+- a bit of memory or of a disk flips
+- a copy stops
+- a sector is lost
+- blocks are written in the wrong place
+- another program writes a field wrongly
 """
 
 import random

@@ -1,4 +1,4 @@
-"""Which chunks a window fetches from a disk, http, S3 or any other address of fsspec."""
+"""The chunks that a window fetches from a disk, http, S3 or any other address of fsspec."""
 
 import re
 import shutil

@@ -140,7 +140,7 @@ def test_label_images_of_an_image_are_noted(tmp_path: Path, version: str) -> Non
 def test_a_label_image_stops_the_plan_unless_the_user_names_it_as_labels(
     tmp_path: Path, version: str, dtype: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It holds only one object, so the voxels alone would look like a mask."""
+    """The label image holds only one object, so the voxels alone would look like a mask."""
     path = labelled(tmp_path / "i.zarr", version, dtype) / "labels" / "cells"
     out = tmp_path / "out"
     assert main(["plan", str(path), "-o", str(out)]) == 2

@@ -53,7 +53,7 @@ def test_light_comes_over_the_left_shoulder(tmp_path: Path) -> None:
     assert upper_left > lower_right + 40 > 60
 
 
-def test_what_is_nearer_hides_what_is_behind_in_either_order(tmp_path: Path) -> None:
+def test_the_nearer_surface_hides_the_farther_one_in_either_order(tmp_path: Path) -> None:
     near = Surface(ball(tmp_path, "near", 4 * EYE, 3.0), RED)
     far = Surface(ball(tmp_path, "far", -4 * EYE, 4.5), BLUE)
     for order in ((near, far), (far, near)):
@@ -82,7 +82,7 @@ def test_boxes_are_hidden_behind_surfaces_and_drawn_before_them(tmp_path: Path) 
     assert 500 < lines.sum() < 8000
     covered = picture_of(Surface(ball(tmp_path, "ball", np.zeros(3), 7.9), RED), boxes=(box,))
     is_line = np.abs(covered - around).sum(axis=2) < 24
-    assert 0.4 < (is_line & lines).sum() / lines.sum() < 0.8  # those behind are hidden
+    assert 0.4 < (is_line & lines).sum() / lines.sum() < 0.8  # the ball hides the lines behind it
 
 
 def test_an_empty_scene_is_a_picture() -> None:

@@ -138,7 +138,7 @@ def test_another_machine_with_the_same_host_name_is_distinguished(
     assert (machine() != here) == Path("/proc/sys/kernel/random/boot_id").exists()
 
 
-def test_of_many_commands_only_one_at_a_time_holds_out(tmp_path: Path) -> None:
+def test_only_one_of_many_commands_at_a_time_holds_the_lock_of_out(tmp_path: Path) -> None:
     inside, most, refused = 0, 0, 0
     count = threading.Lock()
 

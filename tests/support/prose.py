@@ -26,7 +26,7 @@ MAX_AVERAGE_WORDS = 18.0  # words in a sentence, averaged over a page of docs
 SHORTEST_MESSAGE = 4  # words; shorter strings of code are names and keys
 NO_SUBJECT = re.compile(
     r"(what|whatever|who|whoever|whose|whom|which|of|those|one more|none of|the same of)\b"
-    r"(?!.*\?$)",
+    r"(?!.*\?$| to do\b)",
     re.IGNORECASE,
 )
 NO_NOUN = re.compile(r"(it|they|them)\b|(both|neither|either) (is|are|was|were|have)\b", re.I)
@@ -138,7 +138,7 @@ def hits(text: str) -> Iterator[str]:
             yield f"no subject: {one}"
         elif text.strip().startswith(one) and one[0].isupper() and NO_NOUN.match(one):
             yield f"a pronoun without a noun: {one}"
-        elif len(one.split()) > MAX_WORDS and not re.search(r"=|doi\b", one):
+        elif len(one.split()) > MAX_WORDS and not re.search(r"[=|]|->|doi\b", one):
             yield f"{len(one.split())} words, at most {MAX_WORDS}: {one}"
         yield from (
             f"'{w[0]}', write {new}: {one}" for old, new in STUMBLES if (w := old.search(one))

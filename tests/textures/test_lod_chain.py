@@ -145,7 +145,7 @@ def test_each_level_is_near_the_one_before_and_keeps_the_process(with_process: M
     lods = _levels(with_process, (), _settings(errors))
     tip = float(with_process.positions[:, 0].max())
     for before, lod, error in zip(lods, lods[1:], errors[1:], strict=False):
-        # One more error allows for the move that restores the volumes.
+        # The bound allows one error more, for the move that restores the volumes.
         assert _farthest(before.mesh, lod.mesh) <= (STRAY + 1) * error
         assert lod.mesh.positions[:, 0].max() > tip - 8
         assert lod.quality is not None

@@ -23,9 +23,8 @@ from stereocell.transfer.windows import NAMED
 # the voxels do. With an offset of 1000 or 1024 only the noise of air lies there, in 8 bits nothing.
 _DARK_HU, _DARK_SHARE = -30.0, 0.02
 NOTE = (
-    "the values of this CT are not Hounsfield units: transfer functions by tissue, such as bone, "
-    "are not offered, and a table or head holder is kept (--as hounsfield takes the values for "
-    "Hounsfield units)"
+    "the values of this CT are not Hounsfield units, so functions by tissue are not offered and a "
+    "table or head holder is kept (--as hounsfield treats them as such)"
 )
 _PRESETS = ("ct", "ct-bone")  # presets with levels and windows in Hounsfield units
 

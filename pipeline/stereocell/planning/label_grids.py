@@ -30,10 +30,8 @@ def origin_on(image: Dataset, labels: Dataset) -> Triple:
     """
     if _ways_round(image) != _ways_round(labels):
         raise SourceError(
-            f"{labels.shown}: found {_ways_round(labels)}, and the image has "
-            f"{_ways_round(image)}: the orientation of the labels on the image is not known, "
-            "expected formats that state orientation in the same way, such as NIfTI for both, or "
-            "TIFF for both"
+            f"{labels.shown}: found {_ways_round(labels)}, expected {_ways_round(image)} as in the "
+            "image: save both in one format, such as NIfTI or TIFF"
         )
     if image.has_sides or image.placement != IDENTITY:
         between = np.linalg.inv(np.array(image.placement)) @ np.array(labels.placement)

@@ -121,7 +121,6 @@ def notes_before_units(plan: Plan) -> Iterator[str]:
             largest = np.max([box.shape for box in boxes.values()], axis=0) * labels.spacing_um
             z, y, x = ((1 + 2 * AROUND) * largest).tolist()
             yield (
-                f"{labels.name}: objects that do not fit in {z:.4g} x {y:.4g} x {x:.4g} um (z, y, "
-                "x), a tile and half a tile around it, will be cut at tile borders: `units` names "
-                "them"
+                f"{labels.name}: objects larger than {z:.4g} x {y:.4g} x {x:.4g} um (z, y, x), the "
+                "tile and what is read around it, are cut at tile borders (`units` names them)"
             )

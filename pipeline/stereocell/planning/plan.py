@@ -391,10 +391,8 @@ def _halo(
             if name.endswith("_um") and length != AUTO
         )
         raise UsageError(
-            f"the surface's lengths don't suit voxels of {_by(spacing_um)} um (z, y, x): {found} "
-            f"make a unit work on {z * y * x:.3g} voxels for a tile of "
-            f"{_by(tile_size)}, expected at most {limit:,}: "
-            "choose another --preset, smaller lengths or larger tiles"
+            f"surface: {found} make a tile of {_by(tile_size)} voxels read {z * y * x:.3g}, "
+            f"expected at most {limit:,}: choose another --preset, smaller lengths or larger tiles"
         )
     # Four more planes: one for the median, one for the gradient, one because the last plane of a
     # tile belongs to its neighbour, and one beyond that plane (surface._least_on_plane).

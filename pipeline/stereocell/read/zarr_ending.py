@@ -1,8 +1,8 @@
 """Cancel reads that a failed read leaves in zarr's event loop, before Python exits.
 
 zarr reads the chunks of a window concurrently. The first damaged chunk ends the read, but the other
-reads stay in zarr's event loop. zarr closes that loop when Python exits, and each remaining read
-then prints a traceback after our line on the damage. Modules that read through zarr import this
+reads stay in zarr's event loop. The loop is closed when Python exits, and each remaining read then
+prints a traceback after our line on the damage. Modules that read through zarr import this
 module.
 """
 

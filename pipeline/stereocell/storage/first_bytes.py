@@ -3,8 +3,9 @@
 This module knows containers, and formats that StereoCell does not read. Callers add the marks of
 formats that it reads.
 
-Two modules of `storage` need it. contents.py names a foreign file that a command would replace, or
-that was given in place of a build. library_errors.py names a file that a library can't read.
+Two modules of `storage` need it. One, contents.py, names a foreign file that a command would
+replace, or that was given in place of a build. The other, library_errors.py, names a file that a
+library can't read.
 """
 
 import re

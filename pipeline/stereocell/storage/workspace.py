@@ -12,9 +12,10 @@ For a local OUT these functions do nothing. Few modules call them:
 - seals.py, atomic_write.py and file_list.py, which read and write all documents
 - the runner of steps, for the inputs of each task
 - `OutFolder`, for phases and checks
-- modules that need one of many large files: `usd` (a layer or a tile of a stage),
-  `steps/unit_files.py` (a file of a unit), `steps/open_source.py` (an added channel),
-  `steps/tissue_files.py` (all classes)
+- `usd`, for a layer or a tile of a stage
+- `steps/unit_files.py`, for a file of a unit
+- `steps/open_source.py`, for an added channel
+- `steps/tissue_files.py`, for all classes
 - `bundle/write.py`, which moves the files of finished tiles
 """
 

@@ -10,8 +10,9 @@ leaves some points open. Here they mean:
   histogram one side is enough. Counting noise has peaks of its own where the mean is flat: in thin
   tails, and over a spike narrower than the window. So a peak counts only if it rises far enough
   above the saddle to any higher peak. The rise must exceed CHANCE standard deviations of the
-  difference of two means of Poisson counts over the window, sqrt(2 height / its bins), for a height
-  of at least one voxel. A peak that passes this test counts, however low it is beside the others.
+  difference of two means of Poisson counts over the window. One such deviation is sqrt(2 height /
+  its bins), for a height of at least one voxel. A peak that passes this test counts, however low it
+  is beside the others.
 - Second-highest: by the smoothed height. If heights are equal, the darker peak counts as the higher
   one, as air does.
 - The peak before it: the next peak of lower intensity, of any height. In a head that is the air,
@@ -22,8 +23,8 @@ leaves some points open. Here they mean:
   (the mode method of Prewitt & Mendelsohn). The midpoint of the peaks would depend on their widths,
   and cut the broader one.
 - A single peak has no peak before it. The threshold is then the foot of its longer side: the bin
-  farthest below the line from the peak to that side's end (the triangle method of Zack, Rogers &
-  Latt).
+  farthest below the line from the peak to that side's end. This is the triangle method of Zack,
+  Rogers & Latt.
 - A flat histogram, or one with a single filled bin, has no threshold.
 
 References

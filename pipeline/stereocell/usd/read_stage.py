@@ -172,7 +172,8 @@ def loaded(
 def _require_names(tile: Usd.Prim) -> None:
     """Raise StageError for a surface that readers can't find because a prim was renamed.
 
-    Surfaces are recognized by their API schema. Those of an inactive channel are no error.
+    Surfaces are recognized by their API schema. A surface of an inactive channel is allowed to be
+    missing.
     """
     stage = tile.GetStage()
     channels = specimen_of(stage).channels

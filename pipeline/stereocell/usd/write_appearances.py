@@ -97,10 +97,10 @@ def level_to_json(level: SurfaceLevel) -> dict[str, Any]:
         "format": "stereocell-level",
         "version": 1,
         "about": "The surface lies where the denoised voxels are background + iso. Axes z, y, x; "
-        "knots in voxels of the level that was built, values linear between them. Median and "
-        "Gaussian move a value by max_shift at most (null: by any), from the voxel clipped to the "
-        "least and largest of its neighbours in hot_voxel_box but those straight across the plane "
-        "of median_voxels.",
+        "knots in voxels of the level that was built, values linear between them. Each voxel is "
+        "first clipped to the least and largest of its neighbours in hot_voxel_box, leaving out "
+        "those straight across the plane of median_voxels. Median and Gaussian then move its value "
+        "by at most max_shift (null: by any).",
         "iso": level.iso,
         "iso_by_tile": None if level.by_tile is None else level.by_tile.to_json(),
         "background": None if level.background is None else level.background.to_json(),

@@ -69,8 +69,8 @@ __all__ = ["LAYER_SUFFIXES", "SUBLAYERS", "TileExtent", "is_layer", "write_stage
 
 # Sublayers of contents.usda, strongest first
 SUBLAYERS = ("./looks/channels.usda", "./looks/lights.usda")
-_NOTE = """Edit in a layer of your own that has this one as a sublayer; a new build writes these
-files anew. All content comes from contents.usda by a reference, so any opinion in your layers is
+_NOTE = """Edit in a layer of your own that has this one as a sublayer; a new build replaces
+these files. All content comes from contents.usda by a reference, so any opinion in your layers is
 stronger, in classes and variants too."""
 _CONTENTS_NOTE = """Tiles and cameras; see looks/ for colours and transfer functions, tiles/ for
 data. Edit in a layer over stage.usda: one over this layer is not known to `stereocell bundle`."""

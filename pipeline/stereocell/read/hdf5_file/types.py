@@ -19,7 +19,7 @@ def require_standard(stored: h5py.h5t.TypeID, where: str) -> None:
     standard = h5py.h5t.py_create(stored.dtype)
     if not stored.equal(standard):
         raise SourceError(
-            f"{where}: found {8 * stored.get_size()}-bit numbers whose bits are not laid out as in "
-            "a standard type, expected IEEE floats or integers that use all bits: the file is "
-            "damaged: copy it again, or convert it with h5py"
+            f"{where}: found {8 * stored.get_size()}-bit numbers of a layout of their own, "
+            "expected IEEE floats or integers that use all bits: copy the file again, or convert "
+            "it with h5py"
         )

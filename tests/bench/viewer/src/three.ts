@@ -2,8 +2,8 @@
  * three's own example: `VolumeRenderShader1` of its package. Setting: step in voxels. 0 leaves the
  * shader unchanged, which shows the largest value along the ray and not the transfer function.
  *
- * The example has no blending by opacity, so the plainest such loop replaces the body of its
- * `cast_mip`: one look-up per step, front to back, to the end of the ray. Ray, steps and tables are
+ * The example has no blending by opacity. The plainest such loop therefore replaces the body of its
+ * `cast_mip`. It looks up one value per step, front to back, to the end of the ray. Ray, steps and tables are
  * unchanged. Opacities in the table are those of a step.
  */
 import {

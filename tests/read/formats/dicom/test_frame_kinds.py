@@ -343,7 +343,7 @@ def test_scouts_of_a_ct_do_not_make_a_volume(tmp_path: Path) -> None:
 
 
 def test_a_localizer_of_mr_follows_the_other_series(tmp_path: Path) -> None:
-    """It has more voxels than they have, and would make a volume."""
+    """The localizer has more voxels than the other series, and would make a volume."""
     write_series(tmp_path / "l", AFFINE, SHAPE, series="1.2.4", change=image_type("LOCALIZER"))
     small = grid("coronal", shape=(5, 12, 14))
     write_series(tmp_path / "m", small, (5, 12, 14), series="1.2.5", change=image_type("M"))

@@ -1,4 +1,4 @@
-"""Which DICOM frames make one stack, and the notes on a series that is divided."""
+"""Grouping DICOM frames into stacks, and the notes on a series that is divided."""
 
 from pathlib import Path
 from typing import Any

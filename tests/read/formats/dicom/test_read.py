@@ -135,7 +135,7 @@ def test_copies_are_dropped_without_a_note_on_pixels(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("brighter", [0, 5])
-def test_of_duplicates_the_first_by_instance_number_is_read_with_a_note(
+def test_the_duplicate_with_the_lowest_instance_number_is_read_with_a_note(
     tmp_path: Path, brighter: int
 ) -> None:
     paths = write_series(tmp_path / "s", grid())

@@ -20,8 +20,8 @@ from stereocell.read.formats.dicom.frame_kind import IN_PHASE, OPPOSED_PHASE
 _SHIFT_HZ_PER_T = 3.4 * 42.577  # Hz per T; difference in frequency of fat and water
 _CLEAR = 0.5  # smallest |cosine| of an echo's phase that is named
 
-# For headers without a field strength: echo times in ms of the opposed phase at 3 T and 1.5 T, and
-# the ratio of the echo time in phase to it.
+# ms; usual echo times of the opposed phase at 3 T and 1.5 T, and the usual ratio of the echo time
+# in phase to it. They serve headers without a field strength.
 _USUAL_OPPOSED = (1.0, 2.6)
 _USUAL_RATIO = (1.7, 2.3)
 

@@ -2,9 +2,9 @@
 
 PLUGINS assigns a decoder to every compressed transfer syntax, since pydicom would use any that is
 installed, and one of these, pylibjpeg-libjpeg, is under the GPL. GDCM decodes JPEG (baseline,
-extended, lossless), CharLS JPEG-LS, OpenJPEG both forms of JPEG 2000, and pydicom itself RLE, in
-1 ms for 384 x 274 x 16 bits. pylibjpeg-rle takes 0.3 ms, but panics on a stream that is too long,
-with a backtrace that can't be suppressed.
+extended, lossless), CharLS JPEG-LS, and OpenJPEG both forms of JPEG 2000. RLE is decoded by pydicom
+itself, in 1 ms for 384 x 274 x 16 bits. The package pylibjpeg-rle takes 0.3 ms, but panics on a
+stream that is too long, with a backtrace that can't be suppressed.
 
 A compressed image states its own size, which is checked before a decoder allocates memory for it:
 JPEG and JPEG-LS in the frame header SOFn, JPEG 2000 in the marker SIZ, bare or inside JP2 boxes.

@@ -2,9 +2,9 @@
 
 If `space` names anatomical axes, the image lies in the patient, in mm unless `space units` states
 otherwise. Without it (Fiji, CMTK) the image is a stack: x, y, z as stored, with the spacing in
-`space units`. pynrrd's own `read_data` reads the whole file, and opens a file of voxels anywhere on
-the machine, so file_array.py reads the voxels. Comments and `key:=value` pairs may identify a
-patient.
+`space units`. The voxels are read by file_array.py, because pynrrd's `read_data` reads the whole
+file, and opens a file of voxels anywhere on the machine. Comments and `key:=value` pairs may
+identify a patient.
 
 References: https://teem.sourceforge.net/nrrd/format.html
 """

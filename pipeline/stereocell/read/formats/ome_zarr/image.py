@@ -1,6 +1,6 @@
 """Read OME-Zarr 0.1 to 0.6 (Zarr v2 and v3) from a folder, a zip file or an address.
 
-zarr-python reads the arrays. bioio's reader, which builds on it, is not used, because only its
+The arrays are read by zarr-python. The reader of bioio, which builds on it, is not used. Only its
 reading of the JSON metadata would be useful, and importing it took 1.5 s in each process, four
 times as long as zarr:
 - `physical_pixel_sizes` leaves out the units, and takes the first coordinate transformation for a

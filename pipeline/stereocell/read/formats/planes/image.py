@@ -56,10 +56,9 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
     chosen = groups[number - 1]
     if len(chosen) == 1 and len(listed) > 1 and not (series or pattern):
         raise SourceError(
-            f"{where}: found {len(listed)} images whose names don't show a volume, such as "
-            f"{listed[0]!r:.100} and {listed[-1]!r:.100}, expected names with numbers or words "
-            "for planes or channels: name one of the files, choose by --series (`--series list` "
-            "shows them), or describe the names by --pattern"
+            f"{where}: found {len(listed)} images, such as {listed[0]!r:.100} and "
+            f"{listed[-1]!r:.100}, expected numbers or words for planes or channels in their "
+            "names: name one file, choose by --series (`--series list`), or give --pattern"
         )
     if len(groups) > 1:
         why = "asked for" if series else "the largest"
@@ -74,9 +73,9 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
         return image_of_planes(files, notes)
     if first.pages == 1:
         raise SourceError(
-            f"{where}: a volume needs at least 2 planes: found images of one plane, and no number "
-            f"in their names that counts planes, such as {chosen[0].path!r:.100}, expected such "
-            f"numbers, or --pattern with {{z}}{or_one_of(location.source, 'planes', 'tiff')}"
+            f"{where}: found images of one plane whose names don't count planes, such as "
+            f"{chosen[0].path!r:.100}, expected a volume of at least 2 planes: number the files, "
+            f"or give --pattern with {{z}}{or_one_of(location.source, 'planes', 'tiff')}"
         )
     if len(volume.planes) > 1:
         raise SourceError(

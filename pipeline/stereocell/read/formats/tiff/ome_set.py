@@ -1,9 +1,9 @@
 """Compare the files of an OME-TIFF set with the UUIDs in its OME-XML.
 
-The OME-XML names the file of each plane twice, by its name and by its UUID. tifffile opens files by
-their names and never compares the UUIDs, so a file of another acquisition with the right name would
-be read as part of this one. Each file states its own UUID in its own OME-XML. A renamed file is
-found by its UUID. A file that states no UUID is accepted by its name.
+The OME-XML names the file of each plane twice, by its name and by its UUID. The library tifffile
+opens files by their names and never compares the UUIDs. A file of another acquisition with the
+right name would therefore be read as part of this one. Each file states its own UUID in its own
+OME-XML. A renamed file is found by its UUID. A file that states no UUID is accepted by its name.
 
 References: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specification.html
 """
@@ -152,8 +152,8 @@ class _Set:
         if is_there:
             raise SourceError(
                 f"{self._location.shown}: OME-XML: UUID FileName {name!r:.100}: found a file with "
-                f"UUID {stated!r:.60}, expected {uuid!r:.60}: the file belongs to another set, or "
-                "replaces another file: copy the files of this set into a folder of their own"
+                f"UUID {stated!r:.60} of another set, expected {uuid!r:.60}: "
+                "copy the files of this set into a folder of their own"
             )
         if not self._root_uuid and not self._is_companion and len(self._names) == 1:
             own = os.path.basename(self._own)

@@ -191,8 +191,8 @@ def _label_notes(meta: Mapping[str, Any]) -> tuple[str, ...]:
         return ()
     return (
         f"the labels of the slices name {' and '.join(named)}, which the header of ImageJ counts "
-        "as slices: they are read as slices (Image > Hyperstacks > Stack to Hyperstack in ImageJ "
-        "corrects the file)",
+        "as slices: they are read as slices (correct the file by *Stack to Hyperstack* in "
+        "ImageJ)",
     )
 
 
