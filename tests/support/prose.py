@@ -3,15 +3,14 @@
     python -m tests.support.prose [--count] [FILE ...]
 
 Without files, every file of the repository is checked. A hit is printed as FILE:LINE, the rule and
-the sentence, and ends the check with exit code 1. `--count` prints texts and hits of each folder.
+the sentence, and makes the exit code 1. `--count` prints the number of hits in each folder instead.
 
-The linter vale has such rules too. It is not used, because its package fetches a program when it
-first runs, and because it reads neither messages in Python and TypeScript nor GLSL.
+The linter vale is not used. It reads neither messages in Python and TypeScript nor GLSL, and its
+package fetches a program when it first runs.
 """
 
 import ast
 import io
-import json
 import re
 import subprocess
 import sys
@@ -22,19 +21,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 MAX_WORDS = 30  # words in a sentence
-MAX_AVERAGE_WORDS = 18.0  # words in a sentence, averaged over a page of docs
 SHORTEST_MESSAGE = 4  # words; shorter strings of code are names and keys
-NO_SUBJECT = re.compile(
-    r"(what|whatever|who|whoever|whose|whom|which|of|those|one more|none of|the same of)\b"
-    r"(?!.*\?$| to do\b)",
-    re.IGNORECASE,
+NO_SUBJECT = re.compile(  # at the start of a sentence that is no question
+    r"(What(ever)?|Who(ever|se|m)?|Which|Of|Those|One more|None of)\b(?!.*\?$| to do\b)"
 )
-NO_NOUN = re.compile(r"(it|they|them)\b|(both|neither|either) (is|are|was|were|have)\b", re.I)
+NO_NOUN = re.compile(r"(It|They|Them)\b|(Both|Neither|Either) (is|are|was|were|have)\b")
 WORDS = {  # words that readers stumble over, and what to write
     r"anew|once more": "again",
-    r"by turns": "alternately",
     r"at hand": "available",
-    r"(told|said) in vain": "ignored",
     r"(held|holds?|holding) against": "compare with",
     r"(is|are|was|were|be) (told|bidden)": "report, print, pass",
     r"frayed|frays": "noisy",
@@ -42,13 +36,10 @@ WORDS = {  # words that readers stumble over, and what to write
     r"spoil(t|s|ed)?": "damaged",
     r"rungs?|ladders?": "level, levels",
     r"strands?": "segment",
-    r"thereof|therein|whereof|wherein|hither|thither|henceforth": "plain words",
-    r"nought|naught|lest|amid|betwixt|unto": "plain words",
-    r"no more of|nothing of it|none of it": "plain words",
+    r"thereof|therein|whereof|henceforth|nought|lest|amid|none of it|nothing of it": "plain words",
 }
 STUMBLES = [(re.compile(rf"\b({old})\b", re.IGNORECASE), new) for old, new in WORDS.items()]
-# Files of others' words, and files that quote the words which are checked.
-SKIPPED = ("usd_assets/unity/LICENSE.md", "tests/support/prose.py", "tests/support/test_prose.py")
+SKIPPED = ("usd_assets/unity/LICENSE.md", "tests/support/prose.py", "tests/docs/test_prose.py")
 # A sentence ends at a full stop, a blank line, a semicolon, or a colon that ends a line. It also
 # ends before an item of a list, a row of a table, or a row such as "bins  number of bins".
 ENDS = re.compile(
@@ -61,7 +52,7 @@ COMMENT_OR_STRING = re.compile(rf"//[^\n]*(?:\n[ \t]*//[^\n]*)*|/\*.*?\*/|{QUOTE
 
 def _python(source: str) -> Iterator[tuple[int, str]]:
     last = (0, False)  # line of the last comment, and whether it stands alone
-    blocks: list[tuple[int, str]] = []
+    blocks = list[tuple[int, str]]()
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type == tokenize.COMMENT and not re.match(r"#( type:| noqa|!)", token.string):
             line, text = token.start[0], token.string.lstrip("#: ")
@@ -106,26 +97,19 @@ def markdown(source: str) -> Iterator[tuple[int, str]]:
     yield from _matches(re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", source), r"(?s)(?:(?!\n\s*\n).)+")
 
 
-def _hash_comments(source: str) -> Iterator[tuple[int, str]]:
-    return _matches(source, r"(?m)(^[\t @]*#[^!\n]*\n?)+|(?<=\s)##? [^\n]*$", r"(?m)^[\t @]*#+ ?")
-
-
-def _schema(source: str) -> Iterator[tuple[int, str]]:
-    for line, text in _matches(source, r'"(title|description)": "(?:[^"\\]|\\.)*"'):
-        yield line, json.loads(f"{{{text}}}").popitem()[1]
-
-
 READERS = {
     (".py",): _python,
     (".ts", ".mjs", ".glsl", ".frag", ".vert", ".cs", ".hlsl", ".shader"): _typescript,
     (".md",): markdown,
-    (".toml", ".yml", ".yaml", "Makefile", "Containerfile"): _hash_comments,
-    (".schema.json",): _schema,
+    (".toml", ".yml", ".yaml", "Makefile", "Containerfile"): lambda source: _matches(
+        source, r"(?m)(^[\t @]*#[^!\n]*\n?)+|(?<=\s)##? [^\n]*$", r"(?m)^[\t @]*#+ ?"
+    ),
+    (".schema.json",): lambda source: _matches(source, r'(?<=(?:cription|.."title)": ")[^"]+'),
 }
 
 
 def sentences(text: str) -> list[str]:
-    """Return the sentences of a text. Code between backticks counts as one word."""
+    """Return the sentences of a text, in which code between backticks is one word."""
     parts = ENDS.split(re.sub(r"`[^`]*`", "Code", text))
     return [" ".join(part.split()) for part in parts if part and part.strip(" \n-*")]
 
@@ -133,39 +117,33 @@ def sentences(text: str) -> list[str]:
 def hits(text: str) -> Iterator[str]:
     """Yield the rule and the sentence of each hit in one text."""
     for one in sentences(text):
-        # A part that begins with a small letter continues a sentence: of code, a list or a message.
-        if one[0].isupper() and NO_SUBJECT.match(one):
+        # A part that begins with a small letter continues a list or a message.
+        if NO_SUBJECT.match(one):
             yield f"no subject: {one}"
-        elif text.strip().startswith(one) and one[0].isupper() and NO_NOUN.match(one):
+        elif text.strip().startswith(one) and NO_NOUN.match(one):
             yield f"a pronoun without a noun: {one}"
         elif len(one.split()) > MAX_WORDS and not re.search(r"[=|]|->|doi\b", one):
             yield f"{len(one.split())} words, at most {MAX_WORDS}: {one}"
-        yield from (
-            f"'{w[0]}', write {new}: {one}" for old, new in STUMBLES if (w := old.search(one))
-        )
+        for old, new in STUMBLES:
+            if found := old.search(one):
+                yield f"'{found[0]}', write {new}: {one}"
 
 
 def main(arguments: list[str]) -> int:
     """Print the hits, or their number in each folder, and return the exit code."""
     names = [name for name in arguments if name != "--count"]
     names = names or subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).split()
-    texts, found = Counter[str](), Counter[str]()
+    count, lines, rooms = 0, [], Counter[str]()
     for name in (name for name in names if name not in SKIPPED):
-        room = "/".join(Path(name).parts[:-1][:3])
         for reader in (reader for ends, reader in READERS.items() if name.endswith(ends)):
-            of_file = list(reader((ROOT / name).read_text("utf-8")))
-            lines = [f"{name}:{line}: {hit}" for line, text in of_file for hit in hits(text)]
-            sizes = [len(one.split()) for _, text in of_file for one in sentences(text)]
-            if name.endswith(".md") and sum(sizes) > MAX_AVERAGE_WORDS * len(sizes):
-                lines.append(f"{name}: {sum(sizes) / len(sizes):.1f} words a sentence on average")
-            texts[room] += len(of_file)
-            found[room] += len(lines)
-            if "--count" not in arguments:
-                print(*(line[:240] for line in lines), sep="\n", end="\n" if lines else "")
-    for room in sorted(texts) if "--count" in arguments else ():
-        print(f"{room or '.':42} {texts[room]:6} texts {found[room]:5} hits")
-    print(f"prose: {found.total()} hits in {texts.total()} texts")
-    return int(found.total() > 0)
+            for line, text in reader((ROOT / name).read_text("utf-8")):
+                found = [f"{name}:{line}: {hit:.200}" for hit in hits(text)]
+                count, lines = count + 1, lines + found
+                rooms["/".join(name.split("/")[:-1][:3])] += len(found)
+    rows = [f"{room or '.':42} {rooms[room]:5} hits" for room in sorted(+rooms)]
+    print(*(rows if "--count" in arguments else lines), sep="\n")
+    print(f"prose: {len(lines)} hits in {count} texts")
+    return int(bool(lines))
 
 
 if __name__ == "__main__":

@@ -35,8 +35,8 @@ from stereocell.model.spacing import Spacing
 SHARE = 0.5  # share of a mean; a fragment below it is dropped
 ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
 MIN_ALPHA = 1.0  # least alpha in coarsest spacings, since nearer voxels have no gap between them
-# Voxels. Additions by a lower level within this distance of a vessel only thicken its wall. Additions
-# farther away are branches.
+# Voxels. Additions by a lower level within this distance of a vessel only thicken its wall.
+# Additions farther away are branches.
 REACH = 2
 MAIN_SHARE = 0.02  # least voxels of a main component, as a share of the largest component's
 OFFSET_SHARE = 0.1  # offset as a share of alpha; the paper has 0.1 um for 1 um
