@@ -14,7 +14,10 @@ ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "tests" / "bench" / "figures"
 PAGE = ROOT / "docs" / "benchmarks.md"
 # The files of FIGURES in the order of the page
-TOPICS = ("surfaces", "objects", "tissue", "exports", "frames", "ray_march", "bricks")
+TOPICS = (
+    *("surfaces", "objects", "iso_values", "tissue", "scene", "scale", "breadth", "exports"),
+    *("frames", "ray_march", "bricks"),
+)
 _HEAD = """# Benchmarks
 
 This page has the measured comparisons, for readers who compare programs. For the time and size of
