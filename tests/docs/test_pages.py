@@ -50,6 +50,17 @@ def test_sentences_are_short_on_average(page: Path) -> None:
     assert sum(found) <= prose.MAX_AVERAGE_WORDS * len(found), sum(found) / len(found)
 
 
+@pytest.mark.parametrize(
+    "page",
+    [*PAGES, *DECISIONS, ROOT / "README.md", ROOT / "CHANGELOG.md"],
+    ids=lambda page: page.name,
+)
+def test_numbers_have_a_leading_zero(page: Path) -> None:
+    code = r"(?ms)^ *```.*?^ *```|`[^`\n]*`|\]\([^)]*\)"
+    text = re.sub(code, "", page.read_text("utf-8"))
+    assert re.findall(r"(?<![\w.])\.\d+", text) == [], "write 0.8, not .8"
+
+
 def test_pictures_are_small_and_used() -> None:
     shown = "".join(page.read_text("utf-8") for page in [*PAGES, ROOT / "README.md"])
     for picture in DOCS.rglob("*.webp"):
