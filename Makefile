@@ -76,7 +76,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -357,8 +357,8 @@ bench-level-score: setup ## Compare a scored choice of the iso-value with the se
 bench-threshold: setup ## Compare the adaptive threshold with Otsu's and Li's on the head phantom
 	$(BIN)/python tests/bench/threshold.py
 
-bench-tissue: setup ## Compare tissue classes with multi-Otsu on the head phantom
-	$(BIN)/python tests/bench/tissue.py
+bench-tissue: setup ## Compare tissue classes with multi-Otsu on the head phantom  (ARGS=--publish: for the docs)
+	$(WITH_ARGS) $(BIN)/python tests/bench/tissue.py ARGS
 
 # The other programs that benchmarks compare with have folders of their own. Benchmarks report which are
 # missing.
@@ -435,6 +435,9 @@ licences: $(READY) ## Write docs/licences.md from the packages that are installe
 
 format-table: $(READY) ## Write the table of formats in docs/input-formats.md from the formats' rows
 	$(BIN)/python docs/format_table.py
+
+benchmarks: $(READY) ## Write docs/benchmarks.md from the figures in tests/bench/figures
+	$(BIN)/python docs/benchmarks.py
 
 clean: ## Remove .venv, the viewer's packages and build, and caches; builds in out/ stay
 	rm -rf .venv .venv-* $(VIEWER)/node_modules $(VIEWER)/dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -56,8 +56,15 @@ def build(
     Progress goes to stderr. Returns the paths of the results. Raises StereoCellError; its text is
     one line, or one line for each reason if tasks fail.
 
-        built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
-        print(built.report)
+    >>> import json, tempfile, numpy as np, tifffile
+    >>> z, y, x = np.ogrid[-16:16:2, -16:16, -16:16]  # um
+    >>> ball = 1000 / (1 + np.exp(np.sqrt(z**2 + y**2 + x**2) - 10))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     tifffile.imwrite(source := f"{folder}/ball.tif", ball.astype(np.uint16))
+    ...     built = build(source, f"{folder}/out", settings={"plan": {"spacing_um": [2, 1, 1]}})
+    ...     manifest = json.loads(Path(built.bundle).with_name("manifest.json").read_text("utf-8"))
+    >>> [(channel["surface"], round(channel["iso_value"], -2)) for channel in manifest["channels"]]
+    [('clear', 500.0)]
     """
     from stereocell.building import phases
     from stereocell.building.out_folder import require_build_or_nothing
@@ -130,8 +137,14 @@ def open_volume(source: str | Path, **options: Any) -> "Dataset":
     method `read(channel, box, level)`. It returns a Volume with `voxels` (z, y, x) in the source's
     dtype, `spacing_um` and `origin_um`, both (z, y, x).
 
-        dataset = open_volume("head.nii.gz")
-        volume = dataset.read(0, dataset.levels[-1].box, level=len(dataset.levels) - 1)
+    >>> import tempfile, numpy as np, tifffile
+    >>> stack = np.arange(8 * 16 * 16, dtype=np.uint16).reshape(8, 16, 16)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     tifffile.imwrite(f"{folder}/stack.tif", stack)
+    ...     dataset = open_volume(f"{folder}/stack.tif", spacing_um=(2, 1, 1))
+    ...     volume = dataset.read(0, dataset.levels[0].box, level=0)
+    >>> volume.voxels.shape, volume.spacing_um, bool((volume.voxels == stack).all())
+    ((8, 16, 16), (2.0, 1.0, 1.0), True)
     """
     from stereocell import read
     from stereocell.planning.setting_names import named_as_settings

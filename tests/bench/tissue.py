@@ -4,17 +4,22 @@ Parameters were tuned on the first three rows only. The other rows have other se
 and biases.
 """
 
+import argparse
 import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from published import publish
 from skimage.filters import threshold_multiotsu
 
-from stereocell.samples.head import make_head
+from stereocell.samples.head import HeadPhantom, make_head
 from stereocell.tissue.classify import TissueOptions, learn_tissue
 
-NAMES = ("CSF", "grey", "white")
+COLUMNS = (
+    *("shape", "noise", "bias", "seed", "CSF", "grey", "white"),
+    *("multi-Otsu", "multi-Otsu in our mask"),
+)
 FULL = (112, 96, 96)
 CASES = (
     *((FULL, 0.05, 0.4, seed) for seed in (1, 2, 3)),
@@ -36,9 +41,19 @@ def by_otsu(values: NDArray[Any], classes: int) -> NDArray[np.int64]:
     return np.asarray(np.digitize(values, threshold_multiotsu(values, classes)), np.int64)
 
 
+def scores_of(labels: NDArray[np.int64], head: HeadPhantom) -> list[str]:
+    """Return Dice of CSF, grey and white matter, which have the labels 1, 2 and 3."""
+    return [f"{dice(labels == k, head.labels == k):.3f}" for k in (1, 2, 3)]
+
+
 def main() -> None:
-    print("| shape | noise | bias | seed | method | " + " | ".join(NAMES) + " | s |")
-    print("|---" * 9 + "|")
+    """Print a row for each case. With `--publish` the rows replace those of docs/benchmarks.md."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--publish", action="store_true", help="put the table into the docs")
+    given = parser.parse_args()
+    print(f"| {' | '.join(COLUMNS)} | s |")
+    print("|---" * (len(COLUMNS) + 1) + "|")
+    rows = []
     for shape, noise, bias, seed in CASES:
         head = make_head(shape=shape, noise=noise, bias=bias, seed=seed)
         start = time.perf_counter()
@@ -48,16 +63,13 @@ def main() -> None:
         seconds = time.perf_counter() - start
         inside = np.zeros(head.voxels.shape, np.int64)
         inside[tissue.mask] = 1 + by_otsu(head.voxels[tissue.mask], 3)
-        rows = {
-            "ours": np.where(tissue.mask, tissue.probabilities.argmax(axis=0) + 1, 0),
-            "multi-Otsu": by_otsu(head.voxels, 4),
-            "multi-Otsu in our mask": inside,
-        }
-        case = f"{' x '.join(map(str, shape))} | {noise:g} | {bias:g} | {seed}"
-        for name, labels in rows.items():
-            scores = " | ".join(f"{dice(labels == k, head.labels == k):.3f}" for k in (1, 2, 3))
-            shown = f"{seconds:.1f}" if name == "ours" else ""
-            print(f"| {case} | {name} | {scores} | {shown} |", flush=True)
+        ours = np.where(tissue.mask, tissue.probabilities.argmax(axis=0) + 1, 0)
+        scores = [scores_of(labels, head) for labels in (ours, by_otsu(head.voxels, 4), inside)]
+        case = [" x ".join(map(str, shape)), f"{noise:g}", f"{bias:g}", str(seed)]
+        rows.append([*case, *scores[0], *(" ".join(each) for each in scores[1:])])
+        print(f"| {' | '.join(rows[-1])} | {seconds:.1f} |", flush=True)
+    if given.publish:
+        publish("tissue", "Dice by shape, noise and bias", COLUMNS, rows)
 
 
 if __name__ == "__main__":

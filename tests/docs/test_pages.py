@@ -16,7 +16,9 @@ MAX_BYTES = 6000  # size of a page
 MAX_AVERAGE_WORDS = 18.0  # words in a sentence of one page
 MAX_PICTURE_BYTES = 60_000
 # Pages whose tables a program or a test makes
-GENERATED = {"edit-table.md", "input-formats.md", "keys.md", "licences.md", "systems.md"}
+GENERATED = {
+    *("benchmarks.md", "edit-table.md", "input-formats.md", "keys.md", "licences.md", "systems.md"),
+}
 NAMES = [page.name for page in PAGES]
 
 
@@ -47,6 +49,17 @@ def test_sentences_are_short_on_average(page: Path) -> None:
         for sentence in prose.sentences(text)
     ]
     assert sum(found) <= MAX_AVERAGE_WORDS * len(found), sum(found) / len(found)
+
+
+@pytest.mark.parametrize(
+    "page",
+    [*PAGES, *DECISIONS, ROOT / "README.md", ROOT / "CHANGELOG.md"],
+    ids=lambda page: page.name,
+)
+def test_numbers_have_a_leading_zero(page: Path) -> None:
+    code = r"(?ms)^ *```.*?^ *```|`[^`\n]*`|\]\([^)]*\)"
+    text = re.sub(code, "", page.read_text("utf-8"))
+    assert re.findall(r"(?<![\w.])\.\d+", text) == [], "write 0.8, not .8"
 
 
 def test_pictures_are_small_and_used() -> None:

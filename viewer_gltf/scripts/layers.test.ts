@@ -4,7 +4,7 @@ import { against, arrowsOf, circles, partsOf, usersOfHost } from "./layers";
 const arrow = (from: string, to: string) => ({ from, to });
 
 describe("the layers", () => {
-  it("include imports of every kind, except from packages and from outside", () => {
+  it("include imports of every kind, except from packages, from outside and in comments", () => {
     const text = `
       import type { Vec3 } from "../math/vec3";
       import "./panel.css";
@@ -16,6 +16,9 @@ describe("the layers", () => {
       import worker from "./sw?worker&url";
       import { Vector3 } from "three";
       import { sample } from "../../test/support/sample";
+      /**
+       * import { example } from "../app/example";
+       */
       const later = import("../xr/session");`;
     expect(arrowsOf("panel/a.ts", text).map(({ to }) => to)).toEqual([
       "math/vec3.ts",

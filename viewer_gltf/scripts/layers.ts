@@ -39,9 +39,14 @@ export const LAYERS: readonly string[] = [
 /** A file and a file that it imports; both paths are relative to src/. */
 export type Arrow = Readonly<{ from: string; to: string }>;
 
-/** Returns a file's imports of files in src/: static imports, dynamic imports and imports of types. */
+/**
+ * Returns a file's imports of files in src/: static imports, dynamic imports and imports of types.
+ * Imports of examples in comments do not count.
+ */
 export function arrowsOf(from: string, text: string): readonly Arrow[] {
-  const addresses = text.matchAll(/\b(?:from|import)\s*\(?\s*"(\.{1,2}\/[^"?]+)/g);
+  const addresses = text
+    .replace(/^ *\* .*$/gm, "")
+    .matchAll(/\b(?:from|import)\s*\(?\s*"(\.{1,2}\/[^"?]+)/g);
   return [...addresses]
     .map(([, address]) => normalize(join(dirname(from), address)))
     .filter((to) => !to.startsWith(".."))

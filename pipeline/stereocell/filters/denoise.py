@@ -42,6 +42,11 @@ def denoise(volume: Volume, sigma_um: float, max_shift: float | None = None) -> 
     sigma_um   sigma of the Gaussian; 0 turns it off
     max_shift  largest change of a value by both filters, voxel values; None: no limit
     result     float32 (z, y, x), voxel values
+
+    >>> noise = np.random.default_rng(0).normal(100, 40, (16, 32, 32))
+    >>> smoothed = denoise(Volume(noise, (2.0, 1.0, 1.0)), sigma_um=1.0)
+    >>> round(float(smoothed.mean()), -1), bool(smoothed.std() < 0.3 * noise.std())
+    (100.0, True)
     """
     return _filtered(volume, sigma_um, True, max_shift)
 

@@ -44,6 +44,11 @@ def min_max_bricks(volume: NDArray[np.uint8]) -> NDArray[np.uint8]:
     Along an axis of n voxels there are ceil(n / SKIP_BRICK) bricks. Brick b begins at voxel
     i = SKIP_BRICK * b and covers [i - 1, i + SKIP_BRICK], clipped to the volume. So a trilinear
     sample between the outer faces of the brick's own voxels reads no other voxel.
+
+    >>> volume = np.zeros((8, 8, 24), np.uint8)
+    >>> volume[:, :, 9:12] = 200
+    >>> min_max_bricks(volume)[0, 0].tolist()  # only the middle brick can show anything
+    [[0, 0], [0, 200], [0, 0]]
     """
     low, high = volume, volume
     for axis in range(3):

@@ -36,6 +36,13 @@ def write_atlas(path: Path, volume: NDArray[np.uint8]) -> None:
 
     The header holds the numbers for cutting it into slices: `columns`, `rows`, `atlasSize`
     (x, y, z), `apron`. Raises OutputError if the file cannot be written.
+
+    >>> import tempfile
+    >>> volume = np.arange(4 * 6 * 8, dtype=np.uint8).reshape(4, 6, 8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_atlas(Path(folder) / "cell.exr", volume)
+    ...     np.array_equal(read_atlas(Path(folder) / "cell.exr"), volume)
+    True
     """
     depth, height, width = volume.shape
     columns = min(depth, max(1, round((depth * height / width) ** 0.5)))  # nearly square

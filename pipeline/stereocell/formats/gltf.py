@@ -125,6 +125,15 @@ def encode_glb(
     Raises ValueError for a mesh without triangles, for one larger than 65535 steps along an axis,
     and for maps without UVs. It does so too for objects that share a triangle, and for more than
     65536 of them.
+
+    >>> import trimesh
+    >>> ball = trimesh.creation.icosphere(subdivisions=3, radius=10)
+    >>> corners, normals = np.float32(ball.vertices), np.float32(ball.vertex_normals)
+    >>> mesh = Mesh(corners, np.uint32(ball.faces), normals)
+    >>> color = Material((1.0, 0.5, 0.0))
+    >>> glb = encode_glb(mesh, choose_step(20), material=color, name="ball", extras={})
+    >>> glb.data[:4], [round(1e6 * length) for length in (*glb.min_m, *glb.max_m)]  # um
+    (b'glTF', [-10, -10, -10, 10, 10, 10])
     """
     maps = _pick(textures or Textures())
     if len(mesh.triangles) == 0:

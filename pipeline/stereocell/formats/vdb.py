@@ -103,10 +103,11 @@ def write_vdb(
 
     >>> import tempfile
     >>> from stereocell.formats.vdb_read import read_vdb_head
-    >>> path = Path(tempfile.mkdtemp()) / "cell.vdb"
     >>> volume = np.full((4, 6, 8), 255, np.uint8)
-    >>> write_vdb(path, volume, first_um=(0, 0, 0), spacing_um=(2.0, 0.5, 0.5))
-    >>> grid = read_vdb_head(path)[0]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "cell.vdb"
+    ...     write_vdb(path, volume, first_um=(0, 0, 0), spacing_um=(2.0, 0.5, 0.5))
+    ...     grid = read_vdb_head(path)[0]
     >>> grid.name, grid.spacing.tolist(), grid.origin.tolist()
     ('density', [0.5, 0.5, 2.0], [0.0, -2.5, 0.0])
     """

@@ -68,6 +68,14 @@ def repair(distance: Distance, spacing_um: Spacing, *, options: RepairOptions) -
 
     distance    float32 (z, y, x), um, positive inside
     spacing_um  (z, y, x)
+
+    >>> z, y, x = np.ogrid[-12:12, -12:12, -12:12]
+    >>> ball = np.clip(6 - np.sqrt(z**2 + y**2 + x**2), -2, 2).astype(np.float32)
+    >>> ball[2, 2, 2], ball[12, 12, 12] = 1, -1  # a speck outside, and a hole inside
+    >>> options = RepairOptions(alpha_um=0, min_diagonal_um=4, max_cavity_um=4)
+    >>> found = repair(ball, (1.0, 1.0, 1.0), options=options)
+    >>> found.fragments_dropped, found.cavities_filled, bool(ball[2, 2, 2] < 0 < ball[12, 12, 12])
+    (1, 1, True)
     """
     dropped = _drop_fragments(distance, spacing_um, options)
     if options.offset_um > 0:

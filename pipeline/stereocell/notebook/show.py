@@ -61,7 +61,13 @@ def show(
     `picked` and `link` follow the user's actions in the viewer, and may be set; see
     `stereocell.notebook.widget.Viewer`. Raises StereoCellError, whose text is one line.
 
-        viewer = stereocell.show(stack, spacing_um=(0.5, 0.25, 0.25))
+    >>> import numpy as np
+    >>> z, y, x = np.ogrid[-16:16:2, -16:16, -16:16]  # um
+    >>> ball = (1000 / (1 + np.exp(np.sqrt(z**2 + y**2 + x**2) - 10))).astype(np.uint16)
+    >>> viewer = show(ball, spacing_um=(2, 1, 1), channels=["DNA"], name="ball")
+    >>> viewer.set_channel("DNA", color="#00ff00")  # the last line of a cell would be `viewer`
+    >>> viewer.name, viewer.channels["DNA"]["color"]
+    ('ball', '#00ff00')
     """
     import_extra("anywidget", extra="notebook", wanted_by="a notebook's viewer")
     from stereocell.bundle.blob_page import find_page

@@ -42,7 +42,6 @@ def open(
                 `https://`, `s3://`, or another one that fsspec knows)
     time        time point, from 0
     spacing_um  (z, y, x), um; replaces the voxel spacing that the source states
-    series      series of DICOM or of planes, or image of a file of several, from 1 as
     series      series of DICOM or of planes, or image of a file that holds several; counted from 1
                 as `list_series` does; 0: the largest
     pattern     how the files of a folder of planes are named, such as `img_c{c}_z{z}.tif`; empty:
@@ -57,8 +56,14 @@ def open(
     volume (one line: the found value, its place, the expected value). Raises UsageError where the
     source lacks the time point or the series, or where `spacing_um` isn't three positive lengths.
 
-        dataset = open("head.ome.zarr")
-        volume = dataset.read(0, Box((0, 0, 0), (64, 64, 64)))
+    >>> import tempfile, tifffile
+    >>> stated = {"axes": "ZYX", "PhysicalSizeZ": 2, "PhysicalSizeY": 0.5, "PhysicalSizeX": 0.5}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     source = f"{folder}/stack.ome.tif"
+    ...     tifffile.imwrite(source, np.zeros((8, 16, 24), np.uint16), metadata=stated)
+    ...     dataset = open(source)
+    >>> dataset.levels[0].shape, dataset.levels[0].spacing_um
+    ((8, 16, 24), (2.0, 0.5, 0.5))
     """
     location, format = find_reader(source)
     with library_boundary(location.shown, f"a complete source ({format.short_title})"):

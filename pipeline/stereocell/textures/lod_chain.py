@@ -62,6 +62,15 @@ def make_levels(
     first         number of the first level that is made; `fine` is then the level before it
 
     Meshes are validated before the seams of charts split their vertices, which moves no vertex.
+
+    >>> import trimesh
+    >>> ball = trimesh.creation.icosphere(subdivisions=4, radius=10)
+    >>> corners, normals = np.float32(ball.vertices), np.float32(ball.vertex_normals)
+    >>> mesh = Mesh(corners, np.uint32(ball.faces), normals)
+    >>> options, spacing_um = LodOptions(errors=(0.1, 1.0)), (1.0, 1.0, 1.0)
+    >>> levels = make_levels(mesh, (), spacing_um=spacing_um, lod=options, clock=Clock())
+    >>> len(mesh.triangles), [len(level.mesh.triangles) for level in levels]
+    (5120, [796, 70])
     """
     lods: list[Lod] = []
     mesh, number = fine, np.arange(len(fine.positions))  # index of each vertex in the fine mesh

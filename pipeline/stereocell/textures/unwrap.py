@@ -76,6 +76,16 @@ def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
     options  resolved
 
     Raises UsageError without xatlas, which is a package of the extra `maps`.
+
+    >>> import trimesh
+    >>> ball = trimesh.creation.icosphere(subdivisions=3, radius=10)
+    >>> corners, normals = np.float32(ball.vertices), np.float32(ball.vertex_normals)
+    >>> mesh = Mesh(corners, np.uint32(ball.faces), normals)
+    >>> found = unwrap(mesh, UnwrapOptions(texel_um=0.5))
+    >>> found.charts > 1, found.mesh.uvs.shape == found.mesh.positions[:, :2].shape
+    (True, True)
+    >>> bool((found.mesh.uvs >= 0).all() and (found.mesh.uvs <= 1).all())
+    True
     """
     xatlas = import_unwrapper()
     if len(mesh.triangles) > options.max_triangles:

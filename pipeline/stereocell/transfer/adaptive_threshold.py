@@ -118,7 +118,14 @@ def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogr
 
 
 def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:
-    """Return the threshold, or None for a flat histogram such as that of a constant channel."""
+    """Return the threshold, or None for a flat histogram such as that of a constant channel.
+
+    >>> random = np.random.default_rng(0)
+    >>> voxels = np.concatenate([random.normal(200, 20, 9000), random.normal(800, 40, 3000)])
+    >>> found = find_adaptive_threshold(make_histogram(voxels, (0, 1000)))
+    >>> found.reading, [round(peak, -2) for peak in found.peaks], 300 < found.value < 700
+    ('two peaks', [200.0, 800.0], True)
+    """
     counts = np.asarray(histogram.counts, dtype=np.float64)
     if np.count_nonzero(counts) < 2 or counts.min() == counts.max():
         return None

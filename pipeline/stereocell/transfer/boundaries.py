@@ -105,6 +105,14 @@ def suggest(fine: NDArray[np.int64], *, spacing_um: Ratios = EVEN) -> SuggestedS
     fine        int64 (FINE_ROWS, COLUMNS), counts of voxels by gradient and value; see
                 choose_gradient_max
     spacing_um  (z, y, x); only the ratios matter
+
+    >>> from stereocell.transfer.joint_histogram import FINE_ROWS, STEEPEST, count_joint
+    >>> z, y, x = np.ogrid[-24:24, -24:24, -24:24]
+    >>> ball = 50 + 150 / (1 + np.exp(2 * (np.sqrt(z**2 + y**2 + x**2) - 14)))
+    >>> noisy = (ball + np.random.default_rng(0).normal(0, 2, ball.shape)).astype(np.uint8)
+    >>> fine = count_joint(noisy, (1, 1, 1), gradient_max=STEEPEST, rows=FINE_ROWS)
+    >>> [(shape.kind, round(255 * shape.tip, -1)) for shape in suggest(fine).shapes]  # 50 to 200
+    [('triangle', 120.0)]
     """
     gradient_max = choose_gradient_max(fine)
     found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um=spacing_um)

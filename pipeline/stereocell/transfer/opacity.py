@@ -63,6 +63,12 @@ def make_transfer_functions(
     depth_voxels          shortest edge of the volume, in finest voxel spacings; 0: unknown
 
     The level is the iso-value, or a percentile in a channel without a clear surface.
+
+    >>> histogram = np.zeros(256, np.int64)
+    >>> histogram[20], histogram[200] = 9000, 1000  # background and bodies
+    >>> functions = make_transfer_functions(histogram, 0.5)
+    >>> sorted(functions), [intensity for intensity, opacity in functions["sharp"] if opacity > 0]
+    (['default', 'sharp', 'soft', 'surface'], [0.515, 1.0])
     """
     share = np.cumsum(histogram) / max(1, int(histogram.sum()))
     bins = len(histogram)

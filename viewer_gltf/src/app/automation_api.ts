@@ -3,6 +3,17 @@
  * script operates the page like a user, through its controls (`[data-channel="<id>"]
  * [data-part="shown"]`, `color`, `volume`, `transfer-function`; `[data-mode]`,
  * `[data-tile-choice]`, `[data-action]`).
+ *
+ * ```ts
+ * import "./automation_api";
+ *
+ * const viewer = window.stereocell;
+ * if (viewer === undefined) throw new Error("this page shows no viewer");
+ * await viewer.ready;
+ * document.querySelector<HTMLElement>('[data-mode="disc"]')?.click();
+ * await viewer.settled();
+ * const { triangles, volumes } = viewer.snapshot();
+ * ```
  */
 
 import type { Snapshot } from "../host/snapshot";

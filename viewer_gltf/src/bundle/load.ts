@@ -22,7 +22,17 @@ export type Bundle = Readonly<{
   live?: LiveHost;
 }>;
 
-/** Loads and checks the bundle in the folder `base`. Throws BundleError. */
+/**
+ * Loads and checks the bundle in the folder `base`. Throws BundleError.
+ *
+ * ```ts
+ * import { loadBundle } from "./load";
+ *
+ * const { manifest } = await loadBundle("https://lab.example/specimen/");
+ * const surfaces = manifest.channels.filter(({ surface }) => surface !== "none");
+ * document.title = `${manifest.specimen.name}: ${surfaces.map(({ name }) => name).join(", ")}`;
+ * ```
+ */
 export async function loadBundle(base: string): Promise<Bundle> {
   const path = "manifest.json";
   const response = await request(fileAddress(base, path), path, { cache: "no-cache" });

@@ -31,7 +31,23 @@ export type StreamView = Readonly<{
   error_px: number;
 }>;
 
-/** A way to draw the specimen. */
+/**
+ * A way to draw the specimen. A part offers it as its member `form`.
+ *
+ * ```ts
+ * import type { Form, StreamView } from "./form";
+ *
+ * // Draws nothing, and remembers for which error surfaces would be fetched.
+ * class ErrorProbe implements Form {
+ *   readonly triangles = 0;
+ *   error_px = Number.POSITIVE_INFINITY;
+ *
+ *   stream({ error_px }: StreamView): void {
+ *     this.error_px = Math.min(this.error_px, error_px);
+ *   }
+ * }
+ * ```
+ */
 export interface Form {
   /** Loading progress of the overview of all tiles. */
   readonly overview?: Progress;

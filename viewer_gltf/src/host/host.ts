@@ -31,6 +31,24 @@ import { Taps } from "./taps";
 import { Undo } from "./undo";
 import type { Viewpoint } from "./viewpoint";
 
+/**
+ * Shows a bundle in an element of a page.
+ *
+ * ```ts
+ * import * as parts from "../app/parts";
+ * import { loadBundle } from "../bundle/load";
+ * import { Host } from "./host";
+ *
+ * const [view, stage] = [document.createElement("main"), document.createElement("div")];
+ * view.append(stage);
+ * const bundle = await loadBundle("https://lab.example/specimen/");
+ * const host = new Host(bundle, stage, view, Object.values(parts));
+ * host.changed.subscribe(({ mode }) => view.setAttribute("data-mode", mode));
+ * host.dispatch({ type: "show", channel: bundle.manifest.channels[0].id, shown: false });
+ * await host.display.settled();
+ * host.dispose();
+ * ```
+ */
 export class Host implements PartHost {
   readonly display: GpuDisplay;
   readonly undo: Undo;

@@ -99,6 +99,25 @@ export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;
 /**
  * One feature of the viewer. The host calls these members; a part never calls the host's other
  * parts. A part reaches at most two properties deep into the host, which scripts/reach.ts checks.
+ *
+ * ```ts
+ * import type { PartDefinition } from "./part";
+ *
+ * // Announces how many channels are shown, after each change.
+ * export const channelCount: PartDefinition = {
+ *   id: "channel-count",
+ *   create(host) {
+ *     const count = () => host.state.channels.filter(({ shown }) => shown).length;
+ *     return {
+ *       id: "channel-count",
+ *       sync(state, previous) {
+ *         if (state.channels !== previous.channels) host.announce(`Channels shown: ${count()}`);
+ *       },
+ *       dispose: () => undefined,
+ *     };
+ *   },
+ * };
+ * ```
  */
 export interface Part {
   readonly id: string;

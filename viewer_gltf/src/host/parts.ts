@@ -20,6 +20,26 @@ export function inOrder(definitions: readonly PartDefinition[]): readonly PartDe
   return definitions.toSorted((a, b) => (place(a) < place(b) ? -1 : Number(place(a) > place(b))));
 }
 
+/**
+ * Passes each call of the host to all parts, in the order in which they were added.
+ *
+ * ```ts
+ * import type { Part, PartDefinition } from "./part";
+ * import { inOrder, Parts } from "./parts";
+ *
+ * const part = (id: string): Part => ({ id, isLoading: id === "volumes", dispose: () => undefined });
+ * const definitions: readonly PartDefinition[] = [
+ *   { id: "volumes", create: () => part("volumes") },
+ *   { id: "surfaces", rank: 1, create: () => part("surfaces") },
+ * ];
+ * print(inOrder(definitions).map(({ id }) => id)); // ["surfaces","volumes"]
+ * const parts = new Parts(definitions);
+ * parts.add(part("surfaces"));
+ * print(parts.isLoading); // false
+ * parts.add(part("volumes"));
+ * print(parts.isLoading); // true
+ * ```
+ */
 export class Parts {
   readonly keys: KeyTable;
   readonly remedies: Remedies;

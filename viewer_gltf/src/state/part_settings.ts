@@ -18,6 +18,32 @@ export type ActionRules<A> = Readonly<{
   spoken: (state: ViewerState) => string;
 }>;
 
+/**
+ * Settings of one part, as the member `settings` of its definition.
+ *
+ * ```ts
+ * import { lensesOf, type SwitchParameter } from "./parameters/kinds";
+ * import type { PartSettings } from "./part_settings";
+ *
+ * declare module "./parameters/settings" {
+ *   interface Settings {
+ *     readonly hasGrid: boolean;
+ *   }
+ * }
+ *
+ * // One switch, with a row in the panel and the name `grid` in a link.
+ * const GRID: SwitchParameter<Readonly<{ hasGrid: boolean }>> = {
+ *   kind: "switch",
+ *   id: "grid",
+ *   label: "Grid",
+ *   link: "grid",
+ *   ...lensesOf<Readonly<{ hasGrid: boolean }>>()("hasGrid"),
+ *   spoken: ({ hasGrid }) => `Grid: ${hasGrid ? "on" : "off"}`,
+ * };
+ * export const settings: PartSettings = { start: { hasGrid: false }, rows: [GRID] };
+ * print(GRID.spoken(GRID.set({ hasGrid: false }, true))); // "Grid: on"
+ * ```
+ */
 export type PartSettings = Readonly<{
   /** The settings in a bundle that has just opened. */
   start: Partial<SettingsOfParts>;
