@@ -239,9 +239,9 @@ def stage_page() -> str:
         "`OUT/stage/stage.usda` is USD: coordinates in micrometres (`metersPerUnit` 1e-6), Y up, "
         "`/Specimen/Tiles/<tile>` with variants of detail and representation, "
         "`/Specimen/Channels/<channel>` with each channel's look, `/Specimen/Cameras`. "
-        "[The stage](../stage.md) says how to edit it. Attributes beyond USD's own are of two "
-        "applied schemas, made from `schemas/usd/schema.usda`; the channel's has a twin as JSON "
-        "Schema, `schemas/channel.schema.json`.",
+        "[The stage](../stage.md) says how to edit it. Attributes beyond USD's own belong to "
+        "applied schemas, which `schemas/usd/schema.usda` defines. The channel's schema has a twin "
+        "as JSON Schema, `schemas/channel.schema.json`.",
     ]
     for prim in layer.rootPrims:
         if not prim.attributes:

@@ -151,7 +151,7 @@ def test_a_gradient_of_several_colours_is_refused_in_the_window(
     colors = [[1, 0, 0], [0, 0, 1]]
     found = edited(run, bundle, stage, layer, {"field": "Colour and opacity", "colors": colors})
     (line,) = (line for line in found["drawn"] if "several colours" in line)
-    assert line.startswith("CD31: found several colours, expected one")
+    assert line.startswith("CD31: found several colours; expected one")
     assert "Nothing was edited" in found["said"]
 
 

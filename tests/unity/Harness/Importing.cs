@@ -21,7 +21,7 @@ static class Importing
         {
             return isCopy ? BundleMenu.Copy(folder, Asset) : BundleMenu.Link(folder, Asset);
         }
-        catch (BundleException error) when (error.Message.Contains("the console says why"))
+        catch (BundleException error) when (error.Message.Contains("The console shows the reason"))
         {
             throw new BundleException(string.Join("\n", AssetDatabase.ContextOf(Asset).Errors));
         }

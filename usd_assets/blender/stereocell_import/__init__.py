@@ -29,11 +29,11 @@ bl_info = {
     "version": (0, 1, 0),
     "blender": (4, 5, 0),
     "location": "File > Import, File > Export",
-    "description": "Import StereoCell stages as they are meant, export edits as a layer",
+    "description": "Import StereoCell stages and export edits as a layer",
     "category": "Import-Export",
 }
 
-_STAGED = (AS_STAGED, "As in the stage", "What the stage, or the layer over it, selects")
+_STAGED = (AS_STAGED, "As in the stage", "The variant that the stage, or a layer over it, selects")
 
 
 def _items(*names):
@@ -58,48 +58,52 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
     filename_ext = ".usda"
     filter_glob: StringProperty(default="*.usda;*.usdc;*.usd", options={"HIDDEN"})
     tiles: StringProperty(
-        name="Tiles", description="Names or patterns, with commas: r0_c0, r1_*", default="*"
+        name="Tiles",
+        description="Names or patterns of tiles, separated by commas, such as r0_c0, r1_*",
+        default="*",
     )
     channels: EnumProperty(
         name="Channels",
         items=[
             (AS_STAGED, "As in the stage", "The channels that the stage shows"),
-            (ALL, "All", "Also those that the stage does not show, as many stains at once"),
+            (ALL, "All", "All channels, including those that the stage does not show"),
         ],
     )
     lod: EnumProperty(
         name="Level of detail",
-        description="lod0 is the finest; a tile with fewer levels shows its coarsest",
+        description="lod0 is the finest level. A tile with fewer levels shows its coarsest one",
         items=_items("lod0", "lod1", "lod2", "lod3"),
     )
     representation: EnumProperty(name="Show", items=_items("mesh", "volume", "both"))
     transfer_function: StringProperty(
         name="Transfer function",
-        description="The name of one that all channels have; empty: as in the stage",
+        description="Name of a transfer function that all channels have. If it is empty, each "
+        "channel has the function that the stage selects",
         search=_find_functions,
     )
     size: EnumProperty(
         name="Size",
         items=[
-            (MICROMETRES, "1 unit is 1 um", "Right for viewing, lighting and rendering"),
+            (MICROMETRES, "1 unit is 1 um", "This size suits viewing, lighting and rendering"),
             (
                 DISPLAY,
                 "Display size",
-                "1 unit is 1 m, and the specimen is enlarged by a power of ten, up to 1 m",
+                "1 unit is 1 m. The specimen is enlarged by a power of ten, to at most 1 m",
             ),
-            (TRUE, "True size", "1 unit is 1 m: to stand beside other true things"),
+            (TRUE, "True size", "1 unit is 1 m, as for other objects in true size"),
         ],
     )
 
     is_lit: BoolProperty(
         name="Light the scene",
-        description="The stage's lights, a dark backdrop, colours as they are, and Cycles for "
-        "volumes: the scene is ready to be rendered. Off: lights and settings stay as they are",
+        description="Use the stage's lights, a dark backdrop, unchanged colours, and Cycles for "
+        "volumes, so that the scene is ready to render. Otherwise lights and settings stay as they "
+        "are",
         default=True,
     )
     is_stereo: BoolProperty(
         name="Render both eyes",
-        description="Pictures are rendered twice, for the left and the right eye",
+        description="Each image is rendered twice, for the left and the right eye",
         default=False,
     )
 
@@ -119,7 +123,7 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
 
 
 class ExportStereoCellEdits(bpy.types.Operator, ExportHelper):
-    """Write what was changed since the import as a layer over the stage"""
+    """Write the changes since the import as a layer over the stage"""
 
     bl_idname = "export_scene.stereocell_edits"
     bl_label = "Export StereoCell edits"

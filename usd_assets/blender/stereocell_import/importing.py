@@ -100,7 +100,7 @@ def import_stage(context, path, choice, size=MICROMETRES, is_lit=True, is_stereo
             if is_lit and "state" not in made:
                 end_world(context.scene, world)
     if "state" not in made:
-        raise StageProblem(f"{path}: Blender imported nothing of it")
+        raise StageProblem(f"{path}: Blender imported no objects from it")
     root, state = made["state"]
     state["lods"] = {tile: found.get("lod", "") for tile, found in state["selected"].items()}
     state["chosen"] = {

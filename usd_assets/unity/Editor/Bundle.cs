@@ -67,6 +67,7 @@ namespace StereoCell.Editor
     /// <summary>The contents of a bundle. Each file is compared with the size and the SHA-256 that files.json gives.</summary>
     public sealed class Bundle
     {
+        const string Format = "stereocell-bundle";
         const int Version = 1;
 
         public readonly string Name;
@@ -83,10 +84,10 @@ namespace StereoCell.Editor
         {
             this.folder = folder;
             var manifest = Parse("manifest.json", ReadFile("manifest.json"));
-            if ((string)Member(manifest, "format") != "stereocell-bundle") throw new BundleException("manifest.json is of no StereoCell bundle");
+            if ((string)Member(manifest, "format") != Format) throw new BundleException("manifest.json: format is " + manifest["format"] + "; expected " + Format + ". Choose the folder of a StereoCell bundle.");
             if ((int)Member(manifest, "version") != Version)
             {
-                throw new BundleException("manifest.json: found version " + Member(manifest, "version") + ", expected " + Version + ": take this package of the StereoCell that built it");
+                throw new BundleException("manifest.json: version is " + Member(manifest, "version") + "; expected " + Version + ". Use the package of the StereoCell version that built the bundle.");
             }
             var index = (JObject)Member(manifest, "files");
             files = Parse("files.json", Checked((string)Member(index, "path"), index));
@@ -110,7 +111,7 @@ namespace StereoCell.Editor
         public byte[] Read(string path)
         {
             var entry = files[path] as JObject;
-            if (entry == null) throw new BundleException(path + " is not in files.json");
+            if (entry == null) throw new BundleException(path + " is not listed in files.json. Build the bundle again.");
             return Checked(path, entry);
         }
 
@@ -118,18 +119,18 @@ namespace StereoCell.Editor
         public string HashOf(string path)
         {
             var entry = files[path] as JObject;
-            if (entry == null) throw new BundleException(path + " is not in files.json");
+            if (entry == null) throw new BundleException(path + " is not listed in files.json. Build the bundle again.");
             return (string)entry["sha256"];
         }
 
         byte[] Checked(string path, JObject entry)
         {
             var data = ReadFile(path);
-            if (data.Length != (long)entry["bytes"]) throw new BundleException(path + ": found " + data.Length + " bytes, expected " + entry["bytes"]);
+            if (data.Length != (long)entry["bytes"]) throw new BundleException(path + ": size is " + data.Length + " bytes; expected " + entry["bytes"] + ". Copy or build the bundle again.");
             using (var sha256 = SHA256.Create())
             {
                 var found = BitConverter.ToString(sha256.ComputeHash(data)).Replace("-", "").ToLowerInvariant();
-                if (found != (string)entry["sha256"]) throw new BundleException(path + " is damaged: its SHA-256 is not that of files.json");
+                if (found != (string)entry["sha256"]) throw new BundleException(path + " is damaged: its SHA-256 differs from files.json. Copy or build the bundle again.");
             }
             return data;
         }
@@ -137,7 +138,7 @@ namespace StereoCell.Editor
         byte[] ReadFile(string path)
         {
             var isOutside = Path.IsPathRooted(path) || path.Contains("\\") || Array.IndexOf(path.Split('/'), "..") >= 0;
-            if (isOutside) throw new BundleException(path + " leads out of the bundle");
+            if (isOutside) throw new BundleException(path + " leads out of the bundle; expected a path inside its folder. Build the bundle again.");
             return folder.Read(path);
         }
 
@@ -158,14 +159,14 @@ namespace StereoCell.Editor
         static JToken Member(JToken from, string name)
         {
             var found = from is JObject ? from[name] : null;
-            if (found == null) throw new BundleException("the bundle has no " + (from.Path + "." + name).TrimStart('.'));
+            if (found == null) throw new BundleException("the bundle has no field " + (from.Path + "." + name).TrimStart('.') + ". Build the bundle again.");
             return found;
         }
 
         /// <summary>Check an identifier by the pattern of the bundle's schema: it becomes part of file names.</summary>
         static string Identifier(string id)
         {
-            if (!Regex.IsMatch(id, "^[A-Za-z_][A-Za-z0-9_]*$")) throw new BundleException(id + " is no identifier of a tile or channel");
+            if (!Regex.IsMatch(id, "^[A-Za-z_][A-Za-z0-9_]*$")) throw new BundleException(id + " is not an identifier of a tile or channel; expected letters, digits and underscores. Build the bundle again.");
             return id;
         }
 

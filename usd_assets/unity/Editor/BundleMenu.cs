@@ -24,7 +24,7 @@ namespace StereoCell.Editor
 
         static void Choose(Func<string, string, GameObject> bring)
         {
-            var folder = EditorUtility.OpenFolderPanel("The bundle's folder, which holds manifest.json", "", "");
+            var folder = EditorUtility.OpenFolderPanel("Choose the bundle's folder, which holds manifest.json", "", "");
             if (string.IsNullOrEmpty(folder)) return;
             try
             {
@@ -80,7 +80,7 @@ namespace StereoCell.Editor
         {
             AssetDatabase.ImportAsset(asset);
             var made = AssetDatabase.LoadAssetAtPath<GameObject>(asset);
-            if (made == null) throw new BundleException(asset + " was not imported: the console says why");
+            if (made == null) throw new BundleException(asset + " was not imported. The console shows the reason.");
             return made;
         }
     }

@@ -8,19 +8,19 @@ namespace StereoCell.Editor
     [Serializable]
     public sealed class ImportOptions
     {
-        [Min(0.001f), Tooltip("Longest edge of the specimen in the scene, units: its root is scaled to it")]
+        [Min(0.001f), Tooltip("Length of the specimen's longest edge in the scene, in units. The scale of the root is set to it.")]
         public float longestEdge = 0.5f;
 
-        [Min(8), Tooltip("Most texels along an edge of a tile's volume: a coarser level is taken where it has more")]
+        [Min(8), Tooltip("Largest number of texels along an edge of a tile's volume. If there are more, a coarser resolution level is imported.")]
         public int mostTexels = 256;
 
-        [Min(1), Tooltip("Most memory of a tile's volumes while it is loaded, MB: a coarser level is taken where it needs more")]
+        [Min(1), Tooltip("Largest memory of a tile's volumes while they are loaded, in MB. If they need more, a coarser resolution level is imported.")]
         public float budget = 40;
 
-        [Min(0.1f), Tooltip("Error that a level of detail may show, in pixels")]
+        [Min(0.1f), Tooltip("Largest error of a level of detail on the screen, in pixels.")]
         public float errorPixels = 2;
 
-        [Min(1), Tooltip("Height of the screen or eye, in pixels")]
+        [Min(1), Tooltip("Height of the screen, or of the image for one eye, in pixels.")]
         public int screenPixels = 1080;
 
         const int MostOfUnity = 2048;  // texels along an edge of a 3D texture

@@ -22,19 +22,19 @@ namespace StereoCell.Editor
 
         public Ktx2(byte[] data, int level)
         {
-            if (data.Length < Head) throw new InvalidDataException("no KTX 2.0 texture");
+            if (data.Length < Head) throw new InvalidDataException("the file is not a KTX 2.0 texture");
             for (var i = 0; i < Identifier.Length; i++)
             {
-                if (data[i] != Identifier[i]) throw new InvalidDataException("no KTX 2.0 texture");
+                if (data[i] != Identifier[i]) throw new InvalidDataException("the file is not a KTX 2.0 texture");
             }
             var format = BitConverter.ToInt32(data, 12);
             Components = format == 9 ? 1 : format == 37 ? 4 : 0;  // VK_FORMAT_R8_UNORM, R8G8B8A8_UNORM
             var levels = BitConverter.ToInt32(data, 40);
             if (Components == 0 || BitConverter.ToInt32(data, 44) != ZstdScheme)
             {
-                throw new InvalidDataException("expected R8 or RGBA8 texels, packed by zstd; found VK_FORMAT " + format);
+                throw new InvalidDataException("the texture has VK_FORMAT " + format + "; expected R8 or RGBA8 texels, compressed by zstd");
             }
-            if (level < 0 || level >= levels || data.Length < Head + 24 * levels) throw new InvalidDataException("no level " + level);
+            if (level < 0 || level >= levels || data.Length < Head + 24 * levels) throw new InvalidDataException("the texture has no level " + level);
             Width = Math.Max(1, BitConverter.ToInt32(data, 20) >> level);
             Height = Math.Max(1, BitConverter.ToInt32(data, 24) >> level);
             Depth = Math.Max(1, BitConverter.ToInt32(data, 28) >> level);
@@ -44,7 +44,7 @@ namespace StereoCell.Editor
             if (size != (long)Width * Height * Depth * Components || size > int.MaxValue || offset < 0 || length < 0
                 || offset > data.Length - length)
             {
-                throw new InvalidDataException("level " + level + " is cut");
+                throw new InvalidDataException("level " + level + " of the texture does not fit the file");
             }
             Texels = Zstd.Unpack(data, (int)offset, (int)length, (int)size);
         }

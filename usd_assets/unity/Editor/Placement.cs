@@ -168,7 +168,7 @@ namespace StereoCell.Editor
                 }
                 determinant += m[column] * inverse[4 * column];
             }
-            if (Math.Abs(determinant) < 1e-30) throw new BundleException("a volume's matrix is flat");
+            if (Math.Abs(determinant) < 1e-30) throw new BundleException("the matrix of a volume can't be inverted. Build the bundle again.");
             for (var row = 0; row < 3; row++)
             {
                 for (var i = 0; i < 3; i++) inverse[4 * row + i] /= determinant;

@@ -32,7 +32,7 @@ namespace StereoCell.Editor
                 using (var files = BundleFiles.Open(ctx.assetPath))
                 {
                     var bundle = new Bundle(files);
-                    if (bundle.LeftOut.Count > 0) ctx.LogImportWarning(ctx.assetPath + ": not imported: " + string.Join(", ", bundle.LeftOut));
+                    if (bundle.LeftOut.Count > 0) ctx.LogImportWarning(ctx.assetPath + ": these parts of the bundle are not imported: " + string.Join(", ", bundle.LeftOut));
                     root = new GameObject(bundle.Name);
                     var guid = AssetDatabase.AssetPathToGUID(ctx.assetPath);
                     new SpecimenBuilder(bundle, options, guid, OwnMaterial, ctx.AddObjectToAsset).Build(root);

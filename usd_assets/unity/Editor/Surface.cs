@@ -29,7 +29,7 @@ namespace StereoCell.Editor
             if (!isRead)
             {
                 Object.DestroyImmediate(holder);
-                throw new BundleException(path + " was not imported: are glTFast and meshoptimizer decompression in the project?");
+                throw new BundleException(path + " was not imported. Check that glTFast and meshoptimizer decompression are in the project.");
             }
             var made = holder;
             if (holder.transform.childCount == 1)

@@ -44,7 +44,7 @@ namespace StereoCell.Editor
             Edit((Specimen)EditorGUILayout.ObjectField("Specimen", specimen, typeof(Specimen), true));
             if (specimen == null || specimen.table == null)
             {
-                EditorGUILayout.HelpBox("Choose a specimen of the scene.", MessageType.Info);
+                EditorGUILayout.HelpBox("Choose a specimen in the scene.", MessageType.Info);
                 return;
             }
             scroll = EditorGUILayout.BeginScrollView(scroll);
@@ -112,9 +112,9 @@ namespace StereoCell.Editor
         void ChooseLayer()
         {
             var stage = StageOf(specimen);
-            if (stage == null) stage = EditorUtility.OpenFilePanel("The stage that the bundle was made of: stage.usda", "", "usda");
+            if (stage == null) stage = EditorUtility.OpenFilePanel("Choose stage.usda, from which the bundle was made", "", "usda");
             if (string.IsNullOrEmpty(stage)) return;
-            var layer = EditorUtility.SaveFilePanel("Write the edits as a layer", Path.GetDirectoryName(Path.GetDirectoryName(stage)), "from_unity", "usda");
+            var layer = EditorUtility.SaveFilePanel("Write the edits as a USD layer", Path.GetDirectoryName(Path.GetDirectoryName(stage)), "from_unity", "usda");
             if (string.IsNullOrEmpty(layer)) return;
             note = WriteLayer(layer, stage);
         }
@@ -124,9 +124,9 @@ namespace StereoCell.Editor
         {
             var edits = Edits();
             if (edits.Count == 0) return "Nothing was edited, so no layer was written.";
-            if (Path.GetFullPath(layer) == Path.GetFullPath(stage)) return layer + " is the stage itself: choose another name.";
+            if (Path.GetFullPath(layer) == Path.GetFullPath(stage)) return layer + " is the stage itself. Choose another name.";
             File.WriteAllText(layer, StageLayer.Text(layer, stage, edits));
-            return "Wrote " + layer + ". Next: stereocell bundle OUT --stage " + layer;
+            return "Wrote " + layer + ". Next, run: stereocell bundle OUT --stage " + layer;
         }
 
         public List<ChannelEdit> Edits()

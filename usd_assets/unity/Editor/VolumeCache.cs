@@ -38,7 +38,7 @@ namespace StereoCell.Editor
 
         static void Write(string asset, string[] sources, int level, string path)
         {
-            if (string.IsNullOrEmpty(asset)) throw new BundleException(Path.GetFileName(path) + ": the bundle's asset is no longer in the project");
+            if (string.IsNullOrEmpty(asset)) throw new BundleException(Path.GetFileName(path) + ": the bundle's asset is not in the project any more. Link or copy the bundle again.");
             Directory.CreateDirectory(Path.GetDirectoryName(path));
             var part = path + "." + Guid.NewGuid().ToString("N") + ".part";
             try
@@ -50,7 +50,7 @@ namespace StereoCell.Editor
                     var first = volumes[0];
                     if (volumes.Any(each => each.Width != first.Width || each.Height != first.Height || each.Depth != first.Depth || each.Components != 1))
                     {
-                        throw new BundleException(string.Join(", ", sources) + ": expected one channel each, of one size");
+                        throw new BundleException(string.Join(", ", sources) + ": sizes or channels differ; expected volumes of one size with one channel each. Build the bundle again.");
                     }
                     using (var stream = File.Create(part))
                     {

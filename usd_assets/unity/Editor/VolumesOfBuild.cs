@@ -33,7 +33,7 @@ namespace StereoCell.Editor
             {
                 if (!asset.EndsWith("." + SpecimenImporter.Ending, System.StringComparison.Ordinal)) continue;
                 var specimen = AssetDatabase.LoadAssetAtPath<GameObject>(asset);
-                if (specimen == null) throw new BuildFailedException(asset + " was not imported: the console says why");
+                if (specimen == null) throw new BuildFailedException(asset + " was not imported. The console shows the reason.");
                 foreach (var box in specimen.GetComponentsInChildren<VolumeBox>(true)) found.Add(VolumeCache.MakerOf(box)());
             }
             return found;

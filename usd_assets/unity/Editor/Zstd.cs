@@ -20,20 +20,20 @@ namespace StereoCell.Editor
         /// <param name="size">Length of the decompressed data, bytes.</param>
         public static byte[] Unpack(byte[] data, int offset, int length, int size)
         {
-            if (offset < 0 || length < 0 || offset > data.Length - length) throw Broken("beyond the file");
+            if (offset < 0 || length < 0 || offset > data.Length - length) throw Broken("it lies beyond the file");
             try
             {
                 return new Frame(data, offset, offset + length, size).Unpack();
             }
             catch (IndexOutOfRangeException)  // a damaged frame reads or writes beyond an array
             {
-                throw Broken("ends too early");
+                throw Broken("it ends too early");
             }
         }
 
         static InvalidDataException Broken(string why)
         {
-            return new InvalidDataException("no whole zstd frame: " + why);
+            return new InvalidDataException("the zstd frame is damaged: " + why);
         }
 
         static int HighBit(uint value)
@@ -110,7 +110,7 @@ namespace StereoCell.Editor
 
             long Number(int bytes)
             {
-                if (bytes > end - at) throw Broken("ends too early");
+                if (bytes > end - at) throw Broken("it ends too early");
                 long value = 0;
                 for (var i = 0; i < bytes; i++) value |= (long)data[at + i] << 8 * i;
                 at += bytes;
@@ -119,15 +119,15 @@ namespace StereoCell.Editor
 
             public byte[] Unpack()
             {
-                if ((uint)Number(4) != Magic) throw Broken("another format");
+                if ((uint)Number(4) != Magic) throw Broken("it has another format");
                 var descriptor = (int)Number(1);
                 var isSingle = (descriptor & 32) != 0;
-                if ((descriptor & 11) != 0) throw Broken("it asks for a dictionary");
+                if ((descriptor & 11) != 0) throw Broken("it needs a dictionary");
                 if (!isSingle) Number(1);  // the window's size is not needed: the whole output stays in memory
                 var width = descriptor >> 6;
                 var bytes = width == 0 ? (isSingle ? 1 : 0) : 1 << width;
                 var stated = Number(bytes) + (bytes == 2 ? 256 : 0);
-                if (bytes > 0 && stated != output.Length) throw Broken("another size");
+                if (bytes > 0 && stated != output.Length) throw Broken("its size differs from the stated one");
                 bool isLast;
                 do
                 {
@@ -136,16 +136,16 @@ namespace StereoCell.Editor
                     Block(head >> 1 & 3, head >> 3);
                 }
                 while (!isLast);
-                if (done != output.Length) throw Broken("another size");
+                if (done != output.Length) throw Broken("its size differs from the stated one");
                 return output;
             }
 
             void Block(int type, int size)
             {
-                if (size > MostOfBlock) throw Broken("too large a block");
+                if (size > MostOfBlock) throw Broken("a block is too large");
                 if (type == 0)
                 {
-                    if (size > end - at || size > output.Length - done) throw Broken("ends too early");
+                    if (size > end - at || size > output.Length - done) throw Broken("it ends too early");
                     Buffer.BlockCopy(data, at, output, done, size);
                     at += size;
                     done += size;
@@ -157,12 +157,12 @@ namespace StereoCell.Editor
                 }
                 else if (type == 2)
                 {
-                    if (size > end - at) throw Broken("ends too early");
+                    if (size > end - at) throw Broken("it ends too early");
                     var stop = at + size;
                     Sequences(Literals(stop), stop);
                     at = stop;
                 }
-                else throw Broken("a reserved block");
+                else throw Broken("a block has the reserved type");
             }
 
             byte[] Literals(int stop)
@@ -172,7 +172,7 @@ namespace StereoCell.Editor
                 {
                     var headBytes = format == 1 ? 2 : format == 3 ? 3 : 1;
                     var plain = (int)Number(headBytes) >> (headBytes == 1 ? 3 : 4);
-                    if (plain > MostOfBlock) throw Broken("too many literals");
+                    if (plain > MostOfBlock) throw Broken("a block has too many literals");
                     var found = new byte[plain];
                     if (type == 1)
                     {
@@ -180,7 +180,7 @@ namespace StereoCell.Editor
                         for (var i = 0; i < plain; i++) found[i] = value;
                         return found;
                     }
-                    if (plain > stop - at) throw Broken("cut literals");
+                    if (plain > stop - at) throw Broken("its literals are incomplete");
                     Buffer.BlockCopy(data, at, found, 0, plain);
                     at += plain;
                     return found;
@@ -190,23 +190,23 @@ namespace StereoCell.Editor
                 var count = (int)(sizes & (1 << bits) - 1);
                 var packed = (int)(sizes >> bits);
                 var from = at;
-                if (count > MostOfBlock || packed > stop - at) throw Broken("cut literals");
+                if (count > MostOfBlock || packed > stop - at) throw Broken("its literals are incomplete");
                 at += packed;
                 if (type == 2) huffman = Huffman.Read(data, ref from, at);
-                if (huffman == null) throw Broken("no table before");
+                if (huffman == null) throw Broken("it repeats a table that does not exist");
                 var to = new byte[count];
                 if (format == 0)
                 {
                     huffman.Unpack(data, from, at, to, 0, count);
                     return to;
                 }
-                if (at - from < 6) throw Broken("cut literals");
+                if (at - from < 6) throw Broken("its literals are incomplete");
                 var each = (count + 3) / 4;
                 var begin = from + 6;
                 for (var i = 0; i < 4; i++)
                 {
                     var long_ = i < 3 ? data[from + 2 * i] | data[from + 2 * i + 1] << 8 : at - begin;
-                    if (long_ > at - begin || each * i > count) throw Broken("cut literals");
+                    if (long_ > at - begin || each * i > count) throw Broken("its literals are incomplete");
                     huffman.Unpack(data, begin, begin + long_, to, each * i, i < 3 ? Math.Min(each * (i + 1), count) : count);
                     begin += long_;
                 }
@@ -219,11 +219,11 @@ namespace StereoCell.Editor
                 if (mode == 1)
                 {
                     var symbol = (byte)Number(1);
-                    if (symbol >= symbols) throw Broken("an unknown code");
+                    if (symbol >= symbols) throw Broken("it has an unknown code");
                     return new Fse(symbol);
                 }
                 if (mode == 2) return Fse.Read(data, ref at, stop, symbols, mostLog);
-                if (before == null) throw Broken("no table before");
+                if (before == null) throw Broken("it repeats a table that does not exist");
                 return before;
             }
 
@@ -243,7 +243,7 @@ namespace StereoCell.Editor
                     for (var i = 0; i < count; i++)
                     {
                         var code = offsets.Symbol[b];
-                        if (code > 30) throw Broken("too far an offset");
+                        if (code > 30) throw Broken("an offset is too large");
                         var far = (1 << code) + stream.Read(code);
                         var matchCode = matches.Symbol[c];
                         var match = MatchBases[matchCode] + stream.Read(MatchBits[matchCode]);
@@ -256,7 +256,7 @@ namespace StereoCell.Editor
                         c = matches.Base[c] + stream.Read(matches.Bits[c]);
                         b = offsets.Base[b] + stream.Read(offsets.Bits[b]);
                     }
-                    if (stream.Left != 0) throw Broken("sequences of another length");
+                    if (stream.Left != 0) throw Broken("its sequences have another length than stated");
                 }
                 Copy(from, used, from.Length - used, 1, 0);
             }
@@ -280,11 +280,11 @@ namespace StereoCell.Editor
 
             void Copy(byte[] from, int at, int plain, int offset, int match)
             {
-                if (plain < 0 || plain > from.Length - at || plain + (long)match > output.Length - done) throw Broken("another size");
+                if (plain < 0 || plain > from.Length - at || plain + (long)match > output.Length - done) throw Broken("its size differs from the stated one");
                 Buffer.BlockCopy(from, at, output, done, plain);
                 done += plain;
                 if (match == 0) return;
-                if (offset < 1 || offset > done) throw Broken("an offset before the start");
+                if (offset < 1 || offset > done) throw Broken("an offset leads to before the start");
                 for (var i = 0; i < match; i++, done++) output[done] = output[done - offset];
             }
         }

@@ -18,7 +18,7 @@ namespace StereoCell.Editor
             {
                 this.data = data;
                 this.start = start;
-                if (end <= start || data[end - 1] == 0) throw Broken("a stream without an end");
+                if (end <= start || data[end - 1] == 0) throw Broken("a stream has no end");
                 bit = 8 * (end - start - 1) + HighBit(data[end - 1]);  // the highest bit is an end mark, not data
             }
 
@@ -95,7 +95,7 @@ namespace StereoCell.Editor
                         while (at >= high);
                     }
                 }
-                if (at != 0) throw Broken("an uneven table");
+                if (at != 0) throw Broken("the symbols of a table do not fill it");
                 for (var i = 0; i < size; i++)
                 {
                     var state = next[Symbol[i]]++;
@@ -129,13 +129,13 @@ namespace StereoCell.Editor
                     return value;
                 };
                 var log = bits(4) + 5;
-                if (log > mostLog) throw Broken("too fine a table");
+                if (log > mostLog) throw Broken("a table is too large");
                 var counts = new short[symbols];
                 var left = (1 << log) + 1;
                 var symbol = 0;
                 while (left > 1)
                 {
-                    if (symbol >= symbols) throw Broken("too many symbols");
+                    if (symbol >= symbols) throw Broken("a table has too many symbols");
                     var width = HighBit((uint)left) + 1;  // bits of the values 0 .. left
                     var value = bits(width - 1);
                     var small = (1 << width) - 1 - left;
@@ -156,7 +156,7 @@ namespace StereoCell.Editor
                     while (more == 3 && symbol < symbols);
                 }
                 at = from + (bit + 7 >> 3);
-                if (left < 1 || at > end) throw Broken("a table that adds up to nothing");
+                if (left < 1 || at > end) throw Broken("the counts of a table do not add up");
                 return new Fse(counts, log);
             }
         }
@@ -173,13 +173,13 @@ namespace StereoCell.Editor
                 var total = 0;
                 for (var i = 0; i < count; i++)
                 {
-                    if (weights[i] > 12) throw Broken("too long a code");
+                    if (weights[i] > 12) throw Broken("a code is too long");
                     if (weights[i] > 0) total += 1 << weights[i] - 1;
                 }
-                if (total == 0) throw Broken("no codes");
+                if (total == 0) throw Broken("a table has no codes");
                 Log = HighBit((uint)total) + 1;
                 var rest = (1 << Log) - total;
-                if (Log > 11 || (rest & rest - 1) != 0) throw Broken("codes that do not add up");
+                if (Log > 11 || (rest & rest - 1) != 0) throw Broken("the lengths of codes do not add up");
                 weights[count] = (byte)(HighBit((uint)rest) + 1);  // the last weight is not stored; it follows
                 Symbol = new byte[1 << Log];
                 Bits = new byte[1 << Log];
@@ -208,17 +208,17 @@ namespace StereoCell.Editor
                     count = head - 127;
                     for (var i = 0; i < count; i++) weights[i] = (byte)(data[at + i / 2] >> (i % 2 == 0 ? 4 : 0) & 15);
                     at += (count + 1) / 2;
-                    if (at > end) throw Broken("cut weights");
+                    if (at > end) throw Broken("the weights of a table are incomplete");
                     return new Huffman(weights, count);
                 }
                 var stop = at + head;
-                if (stop > end) throw Broken("cut weights");
+                if (stop > end) throw Broken("the weights of a table are incomplete");
                 var table = Fse.Read(data, ref at, stop, 13, 6);
                 var stream = new Backwards(data, at, stop);
                 int a = stream.Read(table.Log), b = stream.Read(table.Log);
                 for (;;)  // two states alternate until all bits are read
                 {
-                    if (count > 253) throw Broken("too many weights");
+                    if (count > 253) throw Broken("a table has too many weights");
                     weights[count++] = table.Symbol[a];
                     if (table.Bits[a] > stream.Left)
                     {
@@ -247,7 +247,7 @@ namespace StereoCell.Editor
                     to[at] = Symbol[next];
                     stream.Skip(Bits[next]);
                 }
-                if (stream.Left != 0) throw Broken("a stream of another length");
+                if (stream.Left != 0) throw Broken("a stream has another length than stated");
             }
         }
     }

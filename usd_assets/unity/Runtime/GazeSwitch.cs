@@ -44,13 +44,13 @@ namespace StereoCell
     [DisallowMultipleComponent, AddComponentMenu("StereoCell/Gaze Switch")]
     public sealed class GazeSwitch : MonoBehaviour
     {
-        [Tooltip("The viewer's camera; the main one, if there is none here")]
+        [Tooltip("Camera of the viewer. If it is empty, the main camera is used.")]
         public Camera viewer;
 
-        [Min(0.1f), Tooltip("Seconds")]
+        [Min(0.1f), Tooltip("Time in seconds for which the gaze must rest on a tile to switch it.")]
         public float dwell = 1.5f;
 
-        [Tooltip("Farthest tile that is switched, world units")]
+        [Tooltip("Largest distance of a tile that is switched, in world units.")]
         public float reach = 100;
 
         Dwell state;

@@ -21,10 +21,10 @@ namespace StereoCell
 
         public bool isVisible = true;
 
-        [Tooltip("Names of the transfer functions; each is a row of the specimen's table")]
+        [Tooltip("Names of the channel's transfer functions. Each function is a row of the specimen's table.")]
         public string[] functions;
 
-        [Tooltip("The chosen one, by its place")]
+        [Tooltip("Number of the chosen transfer function, from 0.")]
         public int function;
 
         [HideInInspector] public int firstRow;
@@ -43,19 +43,19 @@ namespace StereoCell
 
         public List<Channel> channels = new List<Channel>();
 
-        [Tooltip("Transfer functions: 256 texels of intensity, a row each")]
+        [Tooltip("Transfer functions of all channels. Each is a row of 256 texels, one for each intensity.")]
         public Texture2D table;
 
-        [Range(1, 100), Tooltip("Most steps of a ray through all tiles")]
+        [Range(1, 100), Tooltip("Largest number of steps of a ray through all tiles.")]
         public int steps = 100;
 
-        [Range(0, 1), Tooltip("By how much volumes are lit")]
+        [Range(0, 1), Tooltip("Strength of the light on volumes: with 0 they are not shaded.")]
         public float shading = 1;
 
-        [Tooltip("Rays end at surfaces, in play mode: needs the camera's depth texture")]
+        [Tooltip("Whether rays end at surfaces, in play mode. This needs the camera's depth texture.")]
         public bool endsAtSurfaces;
 
-        [Min(1), Tooltip("Most memory of volumes, MB: the tiles that were looked at last stay, as many as fit")]
+        [Min(1), Tooltip("Largest memory of all volumes, in MB. As many of the most recently viewed tiles stay loaded as fit.")]
         public float budget = 40;
 
         readonly Residency<Tile> residency = new Residency<Tile>();
@@ -98,7 +98,7 @@ namespace StereoCell
             var known = Known(channel);
             var index = Array.IndexOf(known.functions, function);
             if (index < 0) throw new ArgumentException(channel + " has no transfer function " + function);
-            if (opacity.Length != table.width) throw new ArgumentException("found " + opacity.Length + " opacities, expected " + table.width);
+            if (opacity.Length != table.width) throw new ArgumentException("found " + opacity.Length + " opacities; expected " + table.width + ", one for each intensity");
             var texels = Table.GetRawTextureData();
             for (var i = 0; i < opacity.Length; i++) texels[4 * (table.width * (known.firstRow + index) + i) + 3] = opacity[i];
             if (ownTable == null)

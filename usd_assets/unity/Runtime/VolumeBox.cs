@@ -23,18 +23,18 @@ namespace StereoCell
         static readonly int[] ToBox = Each("_ToBox", 3);
         static readonly int[] Colors = Each("_Color", MostChannels);
 
-        [Tooltip("Places in the specimen's channels, in the order of the texture's components")]
+        [Tooltip("Numbers of the channels in the specimen, from 0, in the order of the texture's components.")]
         public int[] channels = new int[0];
 
-        [Tooltip("The file of voxels, named after its content")]
+        [Tooltip("Name of the voxel file, which contains a hash of its content.")]
         public string file;
 
-        [Tooltip("Texels: across, rows, slices")]
+        [Tooltip("Number of texels: columns, rows and slices.")]
         public int[] size = new int[3];
 
         [HideInInspector] public string specimenGuid;  // GUID of the imported asset of the bundle
         [HideInInspector] public string[] sources = new string[0];  // files of the bundle, one for each channel
-        [HideInInspector] public int level;  // level of detail in these files
+        [HideInInspector] public int level;  // mip level in these files
 
         VolumeLoad load;
         VolumeTexture texture;

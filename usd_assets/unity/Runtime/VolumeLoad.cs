@@ -97,7 +97,7 @@ namespace StereoCell
             {
                 if (file.Width != box.size[0] || file.Height != box.size[1] || file.Depth != box.size[2] || file.Channels != box.channels.Length)
                 {
-                    throw new InvalidDataException(path + " is of another size than the box: import the bundle again");
+                    throw new InvalidDataException(path + ": size differs from that of the box. Import the bundle again.");
                 }
                 for (var i = 0; i < file.Depth; i++)
                 {

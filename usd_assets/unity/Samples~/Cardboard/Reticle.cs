@@ -11,7 +11,7 @@ namespace StereoCell.Samples
         const int Segments = 48;
         const float DotRadius = 0.12f, Inner = 0.7f, Outer = 1;  // shares of the reticle's radius
 
-        [Tooltip("The specimens whose tiles are looked at; all of the scene, if there are none here")]
+        [Tooltip("Gaze switches whose progress the ring shows. If there are none, all of the scene are used.")]
         public GazeSwitch[] gazes = new GazeSwitch[0];
 
         Mesh mesh;

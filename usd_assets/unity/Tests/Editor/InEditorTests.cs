@@ -24,14 +24,14 @@ namespace StereoCell.Tests
             var shader = Shader.Find("StereoCell/Volume");
             Assert.IsTrue(shader != null, "the shader is not in the project");
             Assert.IsFalse(ShaderUtil.ShaderHasError(shader), "the shader has errors: see its Inspector");
-            Assert.IsTrue(shader.isSupported, "this GPU does not take the shader");
+            Assert.IsTrue(shader.isSupported, "this GPU does not support the shader");
         }
 
         [Test]
         public void SurfacesLieInTheirVolumes()
         {
             var bundle = Environment.GetEnvironmentVariable("STEREOCELL_BUNDLE");
-            if (string.IsNullOrEmpty(bundle)) Assert.Ignore("STEREOCELL_BUNDLE names no bundle");
+            if (string.IsNullOrEmpty(bundle)) Assert.Ignore("STEREOCELL_BUNDLE is not set to the folder of a bundle");
             GameObject made = null;
             try
             {
