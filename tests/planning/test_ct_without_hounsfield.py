@@ -18,7 +18,7 @@ from stereocell.transfer.opacity import evaluate
 from support import nifti_files
 
 SHAPE, SPACING_MM = (20, 48, 48), 3.0  # slices, rows, columns
-STAYS = "not Hounsfield units: transfer functions by tissue, such as bone, are not offered"
+STAYS = "not Hounsfield units, so functions by tissue are not offered"
 
 
 def _hounsfield() -> NDArray[np.float64]:
@@ -131,7 +131,7 @@ def test_a_crop_without_air_is_in_hounsfield_units_if_the_user_says_so(
     source = _write(tmp_path, _crop())
     command = ["plan", str(source), "-o", str(tmp_path / "out"), "--preset", preset]
     assert main(command) == 0
-    assert f"{STAYS}, and a table or head holder is kept (--as hounsfield" in (
+    assert f"{STAYS} and a table or head holder is kept (--as hounsfield" in (
         capfd.readouterr().err.replace("\n", " ")
     )
     said = tmp_path / "said"

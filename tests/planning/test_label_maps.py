@@ -118,10 +118,22 @@ def test_rotated_skewed_and_distant_labels_are_refused(
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        (("i.ome.tif", "l.nii"), "axes by a patient's sides, and the image has its file's own"),
-        (("i.nii", "l.tif"), "its file's own axes, and the image has axes by a patient's sides"),
-        (("i.ome.tif", "guess.nii"), "axes by guessed sides, and the image has its file's own"),
-        (("i.nii", "guess.nii"), "axes by guessed sides, and the image has axes by a patient's"),
+        (
+            ("i.ome.tif", "l.nii"),
+            "axes by a patient's sides, expected its file's own axes as in the image",
+        ),
+        (
+            ("i.nii", "l.tif"),
+            "its file's own axes, expected axes by a patient's sides as in the image",
+        ),
+        (
+            ("i.ome.tif", "guess.nii"),
+            "axes by guessed sides, expected its file's own axes as in the image",
+        ),
+        (
+            ("i.nii", "guess.nii"),
+            "axes by guessed sides, expected axes by a patient's sides as in the image",
+        ),
         (("guess.nii", "guess.nii"), ""),
     ],
 )

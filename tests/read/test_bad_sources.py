@@ -409,4 +409,5 @@ def test_a_host_that_sends_no_parts_of_files_is_named_as_the_reason(tmp_path: Pa
         Thread(target=server.serve_forever, daemon=True).start()
         line = refusal(f"http://127.0.0.1:{server.server_address[1]}/large.ome.tif")
         server.shutdown()
-    assert "the host does not send parts of files: ask its operator" in line
+    assert "the host does not send parts of files, expected a complete TIFF" in line
+    assert ": ask its operator" in line

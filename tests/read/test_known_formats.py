@@ -105,5 +105,7 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(
     (tmp_path / name).write_bytes(head + bytes(600))
     monkeypatch.setattr(extras, "find_spec", lambda library: None)
     for act in (open_source, list_series):
-        with pytest.raises(SourceError, match=rf'with: pip install "stereocell\[{extra}\]"'):
+        with pytest.raises(
+            SourceError, match=rf'expected the extra {extra}: pip install "stereocell\[{extra}\]"'
+        ):
             act(tmp_path / name)

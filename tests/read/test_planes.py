@@ -298,10 +298,10 @@ def test_planes_that_differ_are_named(tmp_path: Path, odd: NDArray[Any], told: s
 
 def test_files_that_do_not_form_a_volume_are_refused(tmp_path: Path) -> None:
     flat = fill(tmp_path / "flat", {"DAPI.tif": volume(4, 4), "GFP.tif": volume(4, 4)})
-    assert "no number in their names that counts planes" in refusal(flat)
+    assert "whose names don't count planes" in refusal(flat)
     for names, told in (
         (("a b", "c", "d e f"), "named alike"),
-        (("p1", "p2"), "show a volume"),
+        (("p1", "p2"), "expected numbers or words for planes"),
     ):
         mixed = tmp_path / names[0]
         mixed.mkdir()

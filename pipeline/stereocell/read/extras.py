@@ -13,5 +13,6 @@ def require_installed(library: str, extra: str, where: str, title: str) -> None:
         is_there = False
     if not is_there:
         raise SourceError(
-            f'{where}: the library for {title} is not installed: pip install "stereocell[{extra}]"'
+            f"{where}: the library for {title} is not installed, expected the extra {extra}: "
+            f'pip install "stereocell[{extra}]"'
         )
