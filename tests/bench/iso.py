@@ -71,8 +71,8 @@ class Figures:
     found: dict[str, Found] = field(default_factory=dict)
     tiles: list[tuple[float, float]] = field(default_factory=list)
     confidence: float = 0.0
-    rung: int = 0  # index of the true level among clear levels
-    rungs: int = 0  # number of clear levels that were found
+    true_level: int = 0  # index of the true level among clear levels
+    level_count: int = 0  # number of clear levels that were found
 
     @property
     def has_truth(self) -> bool:
@@ -114,8 +114,8 @@ def measure(number: int) -> Figures:
     """Return the figures of all methods on one case."""
     case = list(all_cases())[number]
     sight = look_at(case)
-    result = Figures(case.name, case.group, case.held_out, rung=case.rung)
-    result.rungs = len(sight.found.shown())
+    result = Figures(case.name, case.group, case.held_out, true_level=case.level)
+    result.level_count = len(sight.found.shown())
     truth = None if sight.truth is None else Truth(sight.truth, case.spacing_um)
     for name, inside, levels in _solids(sight):
         found = Found(float(inside.mean()), levels=levels)
@@ -125,7 +125,7 @@ def measure(number: int) -> Figures:
         result.found[name] = found
     clear = sight.found.shown()
     if clear and sight.truth is not None:
-        level = clear[min(case.rung, len(clear) - 1)]
+        level = clear[min(case.level, len(clear) - 1)]
         result.confidence = level.confidence
         for place, evidence in sight.tiles:
             judged = sight.found.judge_tile(level, evidence)
@@ -140,7 +140,7 @@ def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
     case, values = sight.case, sight.field
     clear = sight.found.shown()
     if clear:
-        level = clear[min(case.rung, len(clear) - 1)]
+        level = clear[min(case.level, len(clear) - 1)]
         yield OURS, sight.values > level.value, (level.value,) * len(sight.tiles)
     else:
         yield OURS, np.zeros(values.shape, bool), ()
@@ -257,14 +257,14 @@ def print_confidence(what: str, judged: list[tuple[float, float]]) -> None:
 
 def print_inner(cases: list[Figures]) -> None:
     """Print how good inner levels are, how many are missed, and how many are found in excess."""
-    within = [case for case in cases if case.rung]
-    missed = [case.name for case in within if case.rungs <= case.rung]
+    within = [case for case in cases if case.true_level]
+    missed = [case.name for case in within if case.level_count <= case.true_level]
     judged = [(c.confidence, c.found[OURS].dice) for c in within if c.name not in missed]
-    print_confidence("an inner rung", judged)
-    print(f"\ninner rungs that are missed: {len(missed)} of {len(within)} {missed}")
+    print_confidence("an inner level", judged)
+    print(f"\ninner levels that are missed: {len(missed)} of {len(within)} {missed}")
     alike = [case for case in cases if ", x 1," in case.name]  # bodies of equal brightness
-    further = sum(max(0, case.rungs - 1) for case in alike)
-    print(f"further rungs on {len(alike)} volumes whose bodies are all alike: {further}")
+    further = sum(max(0, case.level_count - 1) for case in alike)
+    print(f"further levels on {len(alike)} volumes whose bodies are all alike: {further}")
 
 
 def print_looks(cases: list[Figures]) -> None:

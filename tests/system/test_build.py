@@ -185,7 +185,7 @@ def test_given_iso_value_is_in_units_of_the_source_voxels(tmp_path: Path) -> Non
     # A level that the user gives has no confidence, but its alternatives are listed.
     assert iso["confidence"] is None
     assert channel["appearance"]["surface"] == "clear"
-    assert channel["ladder"]
+    assert channel["levels"]
 
 
 # --- bad input: one line, exit code, nothing half-written

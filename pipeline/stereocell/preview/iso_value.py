@@ -16,7 +16,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels
-from stereocell.isosurface.options import LADDER
+from stereocell.isosurface.options import LEVELS
 from stereocell.model.errors import NoSurfaceError, OutputError, UsageError
 from stereocell.model.tiling import Tile
 from stereocell.model.version import GENERATOR
@@ -258,22 +258,22 @@ def _candidates(
         raw = level + below if above else level
         return Candidate(name, level, above, raw, float(inside), confidence, chosen, setting)
 
-    ladder = () if found.levels is None else found.levels.all_levels
+    all_levels = () if found.levels is None else found.levels.all_levels
     value = chosen.value
     candidates = []
     if value is not None:
         is_given, name = given_level(plan, channel) is not None, plan.settings.isovalue.criterion
         if is_given:
             name = "given"
-        elif channel.rung or name == LADDER:
-            name = channel.rung or plan.settings.isovalue.rung
+        elif channel.level or name == LEVELS:
+            name = channel.level or plan.settings.isovalue.level
         setting = take(plan, channel, value, above=found.subtracts) if is_given else ""
         candidates.append(candidate(name, value, found.subtracts, chosen.confidence, setting, True))
     threshold = found.window.statistics.threshold
     for other in find_other_levels(
         plan,
         channel,
-        ladder,
+        all_levels,
         subtracts=False if found.levels is None else found.levels.subtracts,
         taken=value,
         threshold=None if threshold is None or found.reason else threshold.value,
