@@ -62,8 +62,8 @@ def test_levels_whose_simplification_stops_early_are_reported(
     write_ome_tiff(tmp_path / "l.ome.tif", boxes((3, 4, 20), shape=(16, 24, 24)))
     right = building.simplify_interfaces
 
-    def simplify_interfaces(walls: Interfaces, error: float, *given: Any, **named: Any) -> Any:
-        return (walls, False) if error > 0.2 else right(walls, error, *given, **named)
+    def simplify_interfaces(interfaces: Interfaces, error: float, *given: Any, **named: Any) -> Any:
+        return (interfaces, False) if error > 0.2 else right(interfaces, error, *given, **named)
 
     monkeypatch.setattr(building, "simplify_interfaces", simplify_interfaces)
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".")
@@ -148,15 +148,15 @@ def test_the_deep_check_measures_the_interfaces_again(
 
     def build_objects(labels: np.ndarray, owned: np.ndarray, **named: Any) -> BuiltObjects:
         built = right(labels, owned, **named)
-        walls, areas = built.walls, built.wall_um2
+        interfaces, areas = built.interfaces, built.interface_um2
         if fault == "a wall too many":
-            walls = np.concatenate([walls, [[0, walls[0, 1] + 1]]]).astype(np.int32)
+            interfaces = np.concatenate([interfaces, [[0, interfaces[0, 1] + 1]]]).astype(np.int32)
             areas = np.append(areas, 0.01)
         elif fault == "a wall that is missing":
-            walls, areas = walls[1:], areas[1:]
+            interfaces, areas = interfaces[1:], areas[1:]
         elif fault == "smaller":
             areas = 0.7 * areas
-        return replace(built, walls=walls, wall_um2=areas)
+        return replace(built, interfaces=interfaces, interface_um2=areas)
 
     monkeypatch.setattr(objects_maker, "build_objects", build_objects)
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".", "--grid", grid)

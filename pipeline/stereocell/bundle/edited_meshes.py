@@ -71,7 +71,7 @@ _DEFECTS = {
     "non_manifold_vertices": "pinched vertices",
     "inside_out": "bodies inside out",
     "crossings": "crossings",
-    "walls": "triangles in the cut",
+    "in_cut_plane": "triangles in the cut",
 }
 
 
