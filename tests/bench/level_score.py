@@ -20,7 +20,7 @@ from scipy import optimize
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from corpus import all_cases
-from corpus.sight import look_at
+from corpus.level_search import search_levels
 from stereocell.isosurface import level as bounds
 from stereocell.isosurface.level import Level, clear_of
 
@@ -54,13 +54,13 @@ class VolumeLevels:
 def measure(number: int) -> VolumeLevels:
     """Return the levels of one case of the corpus."""
     case = list(all_cases())[number]
-    sight = look_at(case)
-    levels, shown = sight.found.all_levels, sight.found.shown()
+    search = search_levels(case)
+    levels, shown = search.found.all_levels, search.found.shown()
     if clear_of(levels) and not shown:
         levels = ()  # noise or uneven light; no level is to be chosen
     clear = [k for k, level in enumerate(levels) if level in shown]
     scores = [
-        0.0 if sight.truth is None else dice(sight.values > level.value, sight.truth)
+        0.0 if search.truth is None else dice(search.values > level.value, search.truth)
         for level in levels
     ]
     near = [k for k, level in enumerate(levels) if clear and k < clear[0] and level.is_nearly_clear]

@@ -25,7 +25,16 @@ from support.dicom_series import grid
 from support.dicom_series import sample as scene_on
 from support.digests import digests_of
 from support.exhaustive import sweep
-from support.label_builds import PHASES, boxes, build, column_of, labels_of, objects_of, run, said
+from support.label_builds import (
+    PHASES,
+    boxes,
+    build,
+    column_of,
+    labels_of,
+    objects_of,
+    printed,
+    run,
+)
 from support.phantoms import write_ome_tiff
 
 SHAPE = (24, 48, 96)
@@ -100,7 +109,7 @@ def test_the_table_is_joined_by_label_and_rows_that_do_not_fit_are_reported(
 ) -> None:
     (out / "phases.json").unlink()
     assert run("stage", out, "--workers", 0) == 0
-    output = said(capsys)
+    output = printed(capsys)
     assert "2 rows without an object: CellID 8888, 9999" in output
     assert "1 object without a row: 1" in output
     tissue = make_tissue(SHAPE, 3)
@@ -120,7 +129,7 @@ def test_a_stage_with_classes_is_valid(out: Path, capsys: pytest.CaptureFixture[
     stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
     classes = stage.GetPrimAtPath("/Specimen/Classes/cells").GetChildren()
     assert [one.GetName() for one in classes][:2] == ["class_B_x20_cell", "class_T_x20_cell"]
-    assert run("check", out, "--deep", "--workers", 0) == 0, said(capsys)
+    assert run("check", out, "--deep", "--workers", 0) == 0, printed(capsys)
 
 
 @pytest.mark.slow
@@ -164,10 +173,10 @@ def test_no_work_is_repeated_and_a_table_changes_only_the_stage(
 ) -> None:
     for phase in PHASES[1:]:
         assert run(phase, out, "--workers", 0) == 0
-    said(capsys)
+    printed(capsys)
     for phase in PHASES[1:]:
         assert run(phase, out, "--workers", 0) == 0
-        assert f"{phase}: up to date" in said(capsys)
+        assert f"{phase}: up to date" in printed(capsys)
     before = digests_of(out / "units")
     other = sample.parent / "other.csv"
     other.write_text("label,score\n2,0.5\n3,0.25\n")
@@ -179,7 +188,7 @@ def test_no_work_is_repeated_and_a_table_changes_only_the_stage(
     units = {name for name in digests_of(out / "units") if "volume" in name or "lod" in name}
     assert all(digests_of(out / "units")[name] == before[name] for name in units)
     assert run("stage", out, "--workers", 0) == 0
-    assert "objects without a row" in said(capsys)
+    assert "objects without a row" in printed(capsys)
     assert run("bundle", out, "--workers", 0) == 0
     scores = dict(zip(labels_of(out).tolist(), column_of(out, "score"), strict=True))
     assert scores[2] == 0.5
@@ -260,14 +269,14 @@ def test_a_large_object_is_cut_at_tile_borders_and_stays_one_object(
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
     flags = ("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40")
     build(source, out, *flags)
-    output = said(capsys)
+    output = printed(capsys)
     words = "2 objects, 1 of them cut at tile borders, because they reach farther than half a tile"
     assert f"plan: organs: {words}" in output
     assert f"units: organs: {words}" in output
     # for a label map with more voxels the plan states the limit without reading it
     monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 1000)
     assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
-    assert "beyond their own, out of 40 x 80 x 80 um (z, y, x), will be cut" in said(capsys)
+    assert "beyond their own, out of 40 x 80 x 80 um (z, y, x), will be cut" in printed(capsys)
     folder = out / "bundle/channels/organs"
     content = objects_of(out, "organs")
     assert content["count"] == 2
@@ -329,7 +338,7 @@ def test_small_objects_are_counted_and_large_ones_end_at_the_region(
     flags = ("--labels", ".", "--spacing-um", "1,1,1", "--region", "0:12,0:40,0:20")
     assert run("plan", source, "-o", out, *flags) == 0
     assert run("units", out, "--workers", 0) == 0
-    output = said(capsys)
+    output = printed(capsys)
     assert "l: 2 objects; 1 with too few voxels are left out" in output
     plan = OutFolder(out).plan()
     located = Passes(OutFolder(out), plan, Engine(0)).objects(plan.labels[0])
@@ -394,13 +403,13 @@ def test_the_table_belongs_to_the_first_of_two_label_maps(
     for more, is_reported in ((), False), (("--labels", f"again={again}"), True):
         assert run("plan", sample, "-o", tmp_path / "out", *flags, *more) == 0
         assert (
-            "the table is joined only to the first label map, cells" in said(capsys)
+            "the table is joined only to the first label map, cells" in printed(capsys)
         ) is is_reported
     out, flags = tmp_path / "small", (*flags, *more, "--color-by", "score", "--grid", "2x1")
     build(sample, out, *flags)
     assert objects_of(out)["default"] == "score"
     assert objects_of(out, "again")["default"] != "score"
-    said(capsys)
+    printed(capsys)
     output = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
     assert "--color-by is 'scores', expected one of volume, area, " in output
     assert output.endswith(", score")
@@ -514,7 +523,7 @@ def test_labels_are_read_without_a_cast(tmp_path: Path, capsys: pytest.CaptureFi
     labels[3:9, 4:12, 4:12] = 2**31 + 1
     write_ome_tiff(tmp_path / "cells.ome.tif", labels)
     build(tmp_path / "cells.ome.tif", tmp_path / "out", "--labels", ".")
-    assert "rounded" not in said(capsys)
+    assert "rounded" not in printed(capsys)
     assert labels_of(tmp_path / "out").tolist() == [2**31 + 1]
 
 
@@ -564,7 +573,7 @@ def test_objects_that_are_too_thin_are_reported_and_left_out(
     source, out = tmp_path / "noise.tif", tmp_path / "out"
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
     build(source, out, "--labels", "cells=.", "--spacing-um", "1,1,1")
-    output = said(capsys)
+    output = printed(capsys)
     assert "cells: 1 object left out, too thin to be built, or full of holes: 700" in output
     assert run("report", out) == 0
     assert run("check", out, "--deep", "--workers", 0) == 0
@@ -600,10 +609,10 @@ def test_columns_named_like_primvars_are_renamed_and_paths_are_not_recorded(
 
     # finished results do not need the masks any more
     masks.unlink()
-    said(capsys)
+    printed(capsys)
     for phase in PHASES[1:]:
         assert run(phase, out, "--workers", 0) == 0
-        assert f"{phase}: up to date" in said(capsys)
+        assert f"{phase}: up to date" in printed(capsys)
 
 
 @pytest.mark.slow
@@ -615,7 +624,7 @@ def test_more_objects_than_a_file_can_number_need_more_tiles(
     mask, wide = tmp_path / "many.ome.tif", ["--labels", ".", "--spacing-um", "1,1,1"]
     tifffile.imwrite(mask, (z * 40 + y) * 44 + x + 1, metadata={"axes": "ZYX"})
     assert run("plan", mask, "-o", tmp_path / "one", *wide, "--grid", "1x1") == 2
-    said = capsys.readouterr().err
-    assert "found 70,400 objects in tile r0_c0, expected at most 65,536" in said
-    assert "--grid" in said
+    printed = capsys.readouterr().err
+    assert "found 70,400 objects in tile r0_c0, expected at most 65,536" in printed
+    assert "--grid" in printed
     assert run("plan", mask, "-o", tmp_path / "two", *wide, "--grid", "2x1") == 0

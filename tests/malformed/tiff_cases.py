@@ -177,8 +177,8 @@ def _tags() -> Iterator[Case]:
     runs = b"".join(struct.pack("<I", (1 << 17) << 3 | 2)[:3] + b"\0" for _ in range(_HUGE >> 17))
     zstd = b"\x28\xb5\x2f\xfd"
     yield _made("zstd bomb", strip=zstd + b"\0\x38" + runs + b"\x01\0\0", tags={259: ("H", 50000)})
-    said = zstd + b"\xe0" + struct.pack("<Q", 1 << 60) + b"\x01\0\0"
-    yield _made("zstd claims 2^60", strip=said, tags={259: ("H", 50000)})
+    frame = zstd + b"\xe0" + struct.pack("<Q", 1 << 60) + b"\x01\0\0"
+    yield _made("zstd claims 2^60", strip=frame, tags={259: ("H", 50000)})
 
 
 def _directories() -> Iterator[Case]:

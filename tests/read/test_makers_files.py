@@ -69,7 +69,7 @@ def test_scenes_of_a_czi_are_series(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize(
-    ("offset", "told"),
+    ("offset", "expected"),
     [
         (16, "stored size"),
         (4, "axis X start"),
@@ -78,7 +78,7 @@ def test_scenes_of_a_czi_are_series(tmp_path: Path, capsys: pytest.CaptureFixtur
     ],
 )
 def test_a_czi_s_directory_that_differs_from_its_tiles_is_refused(
-    tmp_path: Path, offset: int | None, told: str
+    tmp_path: Path, offset: int | None, expected: str
 ) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     content = bytearray(path.read_bytes())
@@ -87,7 +87,7 @@ def test_a_czi_s_directory_that_differs_from_its_tiles_is_refused(
     content[entries + 18 if offset is None else axis + max(offset, 0)] ^= 1
     path.write_bytes(content)
     line = refusal(path)
-    assert told in line
+    assert expected in line
     assert "as in the directory" in line
 
 

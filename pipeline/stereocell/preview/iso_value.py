@@ -87,13 +87,13 @@ class Candidate:
 class Preview:
     """The iso-values at which a channel's surface could lie, and the one that a build uses.
 
-    doubt   reason why a build makes no surface; empty if it makes one
-    basis   the tiles in which the iso-values were found, in words
-    unsure  reason why a build calls its iso-value unsure; empty if it is clear or given
+    no_surface_reason  reason why a build makes no surface; empty if it makes one
+    basis              the tiles in which the iso-values were found, in words
+    unsure             reason why a build calls its iso-value unsure; empty if it is clear or given
     """
 
     candidates: list[Candidate]
-    doubt: str
+    no_surface_reason: str
     basis: str
     unsure: str = ""
 
@@ -218,7 +218,7 @@ def table(result: Preview) -> list[str]:
 def _note(result: Preview) -> str:
     """Return the line that says what a build does, and in which tiles this was found."""
     if not any(c.is_chosen for c in result.candidates):
-        return f"a build makes no surface: {result.doubt}; {result.basis}"
+        return f"a build makes no surface: {result.no_surface_reason}; {result.basis}"
     marks = " (b: the background)" if any(c.above for c in result.candidates) else ""
     unsure = f" and calls it unsure: {result.unsure}" if result.unsure else ""
     return f"* a build uses this one{unsure}{marks}; {result.basis}"

@@ -27,10 +27,10 @@ def csv(tmp_path: Path, text: str, name: str = "t.csv") -> str:
 def refusal(place: str, key: str = "", wanted: tuple[str, ...] = ()) -> str:
     with pytest.raises(SourceError) as error:
         read_table(place, key, wanted, "cells")
-    told = str(error.value)
-    assert "\n" not in told
-    assert len(told) < 600
-    return told
+    message = str(error.value)
+    assert "\n" not in message
+    assert len(message) < 600
+    return message
 
 
 @pytest.mark.parametrize(("mark", "name"), [(",", "t.csv"), ("\t", "t.tsv"), (";", "t.csv")])
@@ -110,10 +110,10 @@ def test_a_column_with_many_words_holds_categories(tmp_path: Path) -> None:
     cells = ["1", "2", "tumour", "stroma", "3", "tumour", "tumour"]
     text = "label,zone\n" + "".join(f"{i},{cell}\n" for i, cell in enumerate(cells, start=1))
     (zone,) = read_table(csv(tmp_path, text), "", (), "cells").columns
-    told = (
+    note = (
         "column 'zone': 3 of 7 cells are numbers, others are words such as 'tumour': read as texts"
     )
-    assert (zone.texts, notes(tmp_path, text)) == (tuple(cells), told)
+    assert (zone.texts, notes(tmp_path, text)) == (tuple(cells), note)
 
 
 @pytest.mark.parametrize(("share", "is_number"), [(0.45, True), (0.55, False)])
@@ -136,13 +136,13 @@ def test_a_unit_after_each_number_is_left_out_and_noted(
     text = f"label;a\n1;12{mark}5{unit}\n2;3{mark}25{unit}\n3;\n4;7{mark}0{unit}\n5;n/a\n"
     expected = [12.5, 3.25, np.nan, 7, np.nan]
     assert numbers(tmp_path, text)["a"] == pytest.approx(expected, nan_ok=True)
-    told = f"column 'a': the unit {unit.strip()!r} after the numbers is left out"
-    assert told in notes(tmp_path, text)
+    note = f"column 'a': the unit {unit.strip()!r} after the numbers is left out"
+    assert note in notes(tmp_path, text)
 
 
 def test_a_number_that_often_stands_for_missing_values_is_named(tmp_path: Path) -> None:
-    told = "column 'a': -9999 in 2 cells is read as a number"
-    assert told in notes(tmp_path, "label,a\n1,-9999\n2,3\n3,-9999\n")
+    note = "column 'a': -9999 in 2 cells is read as a number"
+    assert note in notes(tmp_path, "label,a\n1,-9999\n2,3\n3,-9999\n")
     assert notes(tmp_path, "label,depth\n1,-9999\n2,-9000\n3,-200\n") == ""
 
 
@@ -177,8 +177,8 @@ def test_decimal_marks_and_marks_between_thousands_are_recognised(
 
 @pytest.mark.parametrize("cell", ["99.250,5", "99\u202f250,5", "99'250,5"])
 def test_marks_between_thousands_are_noted(tmp_path: Path, cell: str) -> None:
-    told = notes(tmp_path, f"label;a;b\n1;{cell};1,5\n2;5,5;2\n")
-    assert f"marks between thousands are left out: {cell} is 99250.5" in told
+    found = notes(tmp_path, f"label;a;b\n1;{cell};1,5\n2;5,5;2\n")
+    assert f"marks between thousands are left out: {cell} is 99250.5" in found
     once = notes(tmp_path, 'label,a\n1,"2,001"\n2,"3,002"\n')  # the note names the number itself
     assert once.count("2,001 is 2001") + once.count("3,002 is 3002") == 1
     assert "thousands" not in notes(tmp_path, "label;a\n1;0,125\n2;12,5\n3;5\n")
@@ -211,7 +211,7 @@ def test_encodings_of_spreadsheets_are_recognised(tmp_path: Path, encoding: str)
 
 
 @pytest.mark.parametrize(
-    ("before", "told"),
+    ("before", "expected"),
     [
         ("\nVolume\n====================\n", "in line 4"),  # Imaris
         ("sep=;\n", ""),
@@ -220,12 +220,12 @@ def test_encodings_of_spreadsheets_are_recognised(tmp_path: Path, encoding: str)
         ("Pixel size;0.25\nDate;1.5.2024\n", "in line 3"),
     ],
 )
-def test_lines_before_the_header_are_left_out(tmp_path: Path, before: str, told: str) -> None:
+def test_lines_before_the_header_are_left_out(tmp_path: Path, before: str, expected: str) -> None:
     text = before + "Volume;Unit;ID;\n0.5;um^3;3;\n1.5;um^3;4;\n;;;\n"
     table = read_table(csv(tmp_path, text), "", (), "cells")
     assert (table.key, table.labels.tolist()) == ("ID", [3, 4])
     assert [column.name for column in table.columns] == ["Volume", "Unit"]
-    assert (told in " ".join(table.notes)) if told else not table.notes
+    assert (expected in " ".join(table.notes)) if expected else not table.notes
 
 
 def test_repeated_column_names_are_preceded_by_their_group(tmp_path: Path) -> None:
@@ -265,7 +265,7 @@ def test_columns_are_chosen_by_name_and_limited_in_number(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected"),
     [
         ("", "found no header"),
         ("a,b\n1,2\n", "no column holds the objects' numbers: found a, b, expected CellID, label"),
@@ -284,8 +284,8 @@ def test_columns_are_chosen_by_name_and_limited_in_number(tmp_path: Path) -> Non
         (",".join(f"c{i}" for i in range(100_001)) + "\n", "found 100001 columns"),
     ],
 )
-def test_a_text_that_is_not_a_table_is_refused(tmp_path: Path, text: str, told: str) -> None:
-    assert told in refusal(csv(tmp_path, text))
+def test_a_text_that_is_not_a_table_is_refused(tmp_path: Path, text: str, expected: str) -> None:
+    assert expected in refusal(csv(tmp_path, text))
 
 
 def test_files_of_other_kinds_are_refused(tmp_path: Path) -> None:
@@ -407,7 +407,7 @@ def test_only_the_requested_genes_are_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "change", "told"),
+    ("name", "change", "expected"),
     [
         ("X/indices", lambda a: a.__setitem__(0, 7), "X/indices: found 7, beyond the matrix"),
         (
@@ -421,12 +421,12 @@ def test_only_the_requested_genes_are_read(tmp_path: Path) -> None:
 )
 @pytest.mark.slow
 def test_an_h5ad_that_contradicts_itself_is_refused(
-    tmp_path: Path, name: str, change: Any, told: str
+    tmp_path: Path, name: str, change: Any, expected: str
 ) -> None:
     path = anndata(tmp_path / "a" / "b.h5ad", "h5ad", "csr")
     with h5py.File(path, "a") as file:
         change(file[name])
-    assert told in refusal(str(path))
+    assert expected in refusal(str(path))
 
 
 def parquet(tmp_path: Path, **columns: Any) -> str:
@@ -492,9 +492,9 @@ def test_numbers_that_parquet_stores_as_texts_are_read_as_numbers_and_noted(tmp_
     np.testing.assert_array_equal(comma.numbers, [1.5, 2.25, 3.5, 4])
     assert cluster.texts == ("0", "1", "0", "1")
     assert none.texts == ("", "", "-", "")
-    told = " ".join(table.notes)
-    assert "numbers stored as texts are read as numbers: 'area', 'comma'" in told
-    assert "area: '#DIV/0!' (1), empty (1)" in told
+    joined = " ".join(table.notes)
+    assert "numbers stored as texts are read as numbers: 'area', 'comma'" in joined
+    assert "area: '#DIV/0!' (1), empty (1)" in joined
 
 
 @pytest.mark.slow
