@@ -63,9 +63,9 @@ def test_an_edited_window_gives_the_volumes_of_a_build_with_it(
 ) -> None:
     edited = bundle_over(built, tmp_path)
     low, high = WINDOW
-    anew = build(source, tmp_path / "anew", "--window", f"F={low}:{high}") / "bundle"
+    direct = build(source, tmp_path / "direct", "--window", f"F={low}:{high}") / "bundle"
     assert len(volumes(edited)) == 4  # textures and bricks of two tiles
-    assert volumes(edited) == volumes(anew)
+    assert volumes(edited) == volumes(direct)
     assert volumes(edited) != volumes(built / "bundle")
 
 

@@ -23,8 +23,8 @@ Tags = dict[int, tuple[str, Any]]
 
 def cases() -> Iterator[Case]:
     for name in ("f.ome.tif", "t.ome.tif"):
-        yield _spoilt(f"{name} is empty", name, lambda p: p.write_bytes(b""))
-    yield _spoilt("head of zeros", "f.ome.tif", lambda p: p.write_bytes(bytes(5000)))
+        yield _damaged(f"{name} is empty", name, lambda p: p.write_bytes(b""))
+    yield _damaged("head of zeros", "f.ome.tif", lambda p: p.write_bytes(bytes(5000)))
     yield from _tags()
     yield from _directories()
     yield from _texts()
@@ -32,7 +32,7 @@ def cases() -> Iterator[Case]:
     yield from _names()
 
 
-def _spoilt(name: str, file: str, spoil: Callable[[Path], Any]) -> Case:
+def _damaged(name: str, file: str, spoil: Callable[[Path], Any]) -> Case:
     def make(base: Path, folder: Path) -> list[str]:
         path = copied(base, folder, file)
         spoil(path)

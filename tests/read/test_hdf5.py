@@ -142,8 +142,8 @@ def test_an_unknown_filter_is_named_with_a_remedy(
 def test_an_incomplete_file_is_refused_in_one_line(tmp_path: Path, suffix: str) -> None:
     path = write(tmp_path / "a.h5", voxels=np.zeros((9, 300, 300)))
     content = path.read_bytes()
-    for spoilt in (b"", b"no HDF5 at all", content[:512], content[: len(content) // 2]):
-        (tmp_path / f"b{suffix}").write_bytes(spoilt)
+    for damaged in (b"", b"no HDF5 at all", content[:512], content[: len(content) // 2]):
+        (tmp_path / f"b{suffix}").write_bytes(damaged)
         refusal(tmp_path / f"b{suffix}")
     half = f"cut short at byte {len(content) // 2} of {len(content)}"
     assert half in refusal(tmp_path / f"b{suffix}")

@@ -336,12 +336,12 @@ def test_other_kinds_of_images_are_left_out_and_noted(tmp_path: Path) -> None:
 
 def test_a_plane_that_is_cut_short_or_not_an_image_is_named(tmp_path: Path) -> None:
     for suffix, write in (("tif", tiff), ("png", png), ("jpg", pillow)):
-        for spoilt in (0.0, 0.3, 0.9):
-            folder = tmp_path / f"{suffix}{spoilt}"
+        for share in (0.0, 0.3, 0.9):
+            folder = tmp_path / f"{suffix}{share}"
             pixels = volume(40, 44, dtype="uint8")
             fill(folder, {f"z{z}.{suffix}": pixels for z in range(4)}, write)
             content = (folder / f"z2.{suffix}").read_bytes()
-            (folder / f"z2.{suffix}").write_bytes(content[: int(spoilt * len(content))])
+            (folder / f"z2.{suffix}").write_bytes(content[: int(share * len(content))])
             assert f"z2.{suffix}" in refusal(folder)
         (folder / f"z2.{suffix}").write_text("<html>")
         assert "found an HTML page" in refusal(folder)

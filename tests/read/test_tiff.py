@@ -505,13 +505,13 @@ def test_planes_that_were_written_one_by_one_are_a_stack(tmp_path: Path, photome
 def test_a_companion_that_names_no_file_is_refused(tmp_path: Path) -> None:
     text = companion_set(tmp_path, counted("ZYX"), [f"x-Z{index}.ome.tiff" for index in range(5)])
     source = tmp_path / "y.companion.ome"
-    for spoilt, expected in (
+    for content, expected in (
         (text.replace("x-Z0", "gone"), "FileName: found 'gone.ome.tiff'"),
         (text.replace("x-Z0", "../x-Z0"), "leads to"),
         (text[:200], "OME-XML:"),
         ("", "found an empty file (copy or download it again), expected OME-XML"),
     ):
-        source.write_text(spoilt)
+        source.write_text(content)
         assert expected in refusal(source)
 
 

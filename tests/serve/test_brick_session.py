@@ -348,7 +348,7 @@ def test_unknown_volumes_are_reported_and_the_connection_continues(port):
 
 def test_a_damaged_volume_is_logged_in_full_and_reported_without_folders(tmp_path, caplog):
     out = write_out(tmp_path / "out", VOLUME)
-    (out / "bundle/volumes/r0_c0/CD31.ktx2").write_bytes(b"spoilt")
+    (out / "bundle/volumes/r0_c0/CD31.ktx2").write_bytes(b"damaged")
     with serving(out) as server, talk(server.port) as t:
         t.say({"type": "open", "volumes": [CD31]})
         error = t.until("error")
