@@ -70,7 +70,7 @@ class Page(HTMLParser):
 
 
 def least_mb(bundle: Path, file: Path) -> float:
-    with pytest.raises(UsageError, match=r"^--max-mb is 0\.001: .* takes [\d.]+ MB: expected") as e:
+    with pytest.raises(UsageError, match=r"^--max-mb is 0\.001: .* takes [\d.]+ MB, expected") as e:
         write_scene(bundle, file, max_mb=0.001)
     found = re.search(r"takes ([\d.]+) MB", str(e.value))
     assert found
