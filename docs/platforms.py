@@ -87,10 +87,10 @@ def cell(found: Mapping[str, Found]) -> str:
     """Return a cell of the table: the versions of Python that resolve, and the lacking packages."""
     good = [python for python in PYTHONS if not found[python].lacking]
     lacking = sorted({one.lacking for one in found.values() if one.lacking})
-    said = f"{spans(good)}" if good else "no"
+    versions = f"{spans(good)}" if good else "no"
     if any(one.newer for one in found.values()):
-        said += ", glibc 2.35"
-    return f"{said} ({', '.join(lacking)})" if lacking else said
+        versions += ", glibc 2.35"
+    return f"{versions} ({', '.join(lacking)})" if lacking else versions
 
 
 def spans(pythons: Iterable[str]) -> str:

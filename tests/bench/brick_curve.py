@@ -60,8 +60,8 @@ def main(source: Path) -> int:
         voxels = decode_finest(texture)[..., 0]
         print(f"tile {volume.tile}, channel {volume.channel}, drawn by its function", end=" ")
         print(f"`{channel['transfer_function']}`")
-        tell_build(voxels, volume.threshold, len(texture))
-        tell_functions(out / "bundle", channel, voxels, len(texture))
+        print_build(voxels, volume.threshold, len(texture))
+        print_functions(out / "bundle", channel, voxels, len(texture))
         shown = np.where(voxels > volume.threshold, voxels, 0)
         print(f"\nmip levels of the KTX2 file, coarse to fine ({len(texture):,} bytes)")
         print(f"{'bytes':>12} {'PSNR dB':>8} {'above threshold':>16}")
@@ -73,11 +73,11 @@ def main(source: Path) -> int:
                 drawn = stretch(level, voxels.shape)
                 seen = psnr(np.where(drawn > volume.threshold, drawn, 0), shown)
                 print(f"{spent:12,} {psnr(drawn, voxels):8.2f} {seen:16.2f}")
-        tell_stream(out, volume, voxels, shown)
+        print_stream(out, volume, voxels, shown)
     return 0
 
 
-def tell_build(voxels: np.ndarray, threshold: int, ktx2_bytes: int) -> None:
+def print_build(voxels: np.ndarray, threshold: int, ktx2_bytes: int) -> None:
     times = []
     for _ in range(3):
         start = time.perf_counter()
@@ -96,7 +96,7 @@ def tell_build(voxels: np.ndarray, threshold: int, ktx2_bytes: int) -> None:
     print(f"texels that came back otherwise: {differs.mean():.4f} of all, above threshold: {above}")
 
 
-def tell_functions(bundle: Path, channel: dict, voxels: np.ndarray, ktx2_bytes: int) -> None:
+def print_functions(bundle: Path, channel: dict, voxels: np.ndarray, ktx2_bytes: int) -> None:
     """Print the size of the tree if the stage opened with another function."""
     rows = decode_finest((bundle / channel["lut"]["path"]).read_bytes())[0]
     print(f"\n{'function':>12} {'threshold':>9} {'bytes':>12} {'of KTX2':>8}")
@@ -106,7 +106,7 @@ def tell_functions(bundle: Path, channel: dict, voxels: np.ndarray, ktx2_bytes: 
         print(f"{name:>12} {threshold:9} {size:12,} {size / ktx2_bytes:8.2f}")
 
 
-def tell_stream(out: Path, volume: Volume, voxels: np.ndarray, shown: np.ndarray) -> None:
+def print_stream(out: Path, volume: Volume, voxels: np.ndarray, shown: np.ndarray) -> None:
     server = BundleServer(out, 0, lan=False)
     thread = Thread(target=server.run)
     thread.start()

@@ -122,8 +122,8 @@ class Meter:
 def _memory_mb() -> tuple[float, float]:
     """Return the present and the peak memory of this process."""
     lines = Path("/proc/self/status").read_text("utf-8").splitlines()
-    said = dict(line.split(":", 1) for line in lines)
-    return int(said["VmRSS"].split()[0]) / 1024, int(said["VmHWM"].split()[0]) / 1024
+    fields = dict(line.split(":", 1) for line in lines)
+    return int(fields["VmRSS"].split()[0]) / 1024, int(fields["VmHWM"].split()[0]) / 1024
 
 
 def ours(labels: NDArray[np.int32], spacing_um: Triple, step_um: float) -> Made:

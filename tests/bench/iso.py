@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from corpus import all_cases
 from corpus.case import Mask
 from corpus.collected import missing
+from corpus.level_search import LevelSearch, search_levels
 from corpus.real import data_folder
-from corpus.sight import Sight, look_at
 from stereocell.isosurface.distance_field import gradient_magnitude
 from stereocell.isosurface.edge_criteria import choose_by_edges, gather_edges
 from stereocell.isosurface.level_histogram import BINS as BINS_OF_SCALE
@@ -71,8 +71,8 @@ class Figures:
     found: dict[str, Found] = field(default_factory=dict)
     tiles: list[tuple[float, float]] = field(default_factory=list)
     confidence: float = 0.0
-    rung: int = 0  # index of the true level among clear levels
-    rungs: int = 0  # number of clear levels that were found
+    true_level: int = 0  # index of the true level among clear levels
+    level_count: int = 0  # number of clear levels that were found
 
     @property
     def has_truth(self) -> bool:
@@ -113,38 +113,38 @@ def _some(points: NDArray[np.float64]) -> NDArray[np.float64]:
 def measure(number: int) -> Figures:
     """Return the figures of all methods on one case."""
     case = list(all_cases())[number]
-    sight = look_at(case)
-    result = Figures(case.name, case.group, case.held_out, rung=case.rung)
-    result.rungs = len(sight.found.shown())
-    truth = None if sight.truth is None else Truth(sight.truth, case.spacing_um)
-    for name, inside, levels in _solids(sight):
+    search = search_levels(case)
+    result = Figures(case.name, case.group, case.held_out, true_level=case.level)
+    result.level_count = len(search.found.shown())
+    truth = None if search.truth is None else Truth(search.truth, case.spacing_um)
+    for name, inside, levels in _solids(search):
         found = Found(float(inside.mean()), levels=levels)
         if truth is not None:
             found.dice = dice(inside, truth.inside)
             found.away = truth.distance(inside)
         result.found[name] = found
-    clear = sight.found.shown()
-    if clear and sight.truth is not None:
-        level = clear[min(case.rung, len(clear) - 1)]
+    clear = search.found.shown()
+    if clear and search.truth is not None:
+        level = clear[min(case.level, len(clear) - 1)]
         result.confidence = level.confidence
-        for place, evidence in sight.tiles:
-            judged = sight.found.judge_tile(level, evidence)
+        for place, evidence in search.tiles:
+            judged = search.found.judge_tile(level, evidence)
             if judged is not None:
-                inside = sight.values[place] > level.value
-                result.tiles.append((judged.confidence, dice(inside, sight.truth[place])))
+                inside = search.values[place] > level.value
+                result.tiles.append((judged.confidence, dice(inside, search.truth[place])))
     return result
 
 
-def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
+def _solids(search: LevelSearch) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
     """Yield each method's name, its mask of the inside, and the tiles' levels."""
-    case, values = sight.case, sight.field
-    clear = sight.found.shown()
+    case, values = search.case, search.field
+    clear = search.found.shown()
     if clear:
-        level = clear[min(case.rung, len(clear) - 1)]
-        yield OURS, sight.values > level.value, (level.value,) * len(sight.tiles)
+        level = clear[min(case.level, len(clear) - 1)]
+        yield OURS, search.values > level.value, (level.value,) * len(search.tiles)
     else:
         yield OURS, np.zeros(values.shape, bool), ()
-    sample = values[~sight.padding] if not sight.padding.all() else values.ravel()
+    sample = values[~search.padding] if not search.padding.all() else values.ravel()
     sample = sample[:: max(1, sample.size // _SAMPLE)]
     for name, peer in PEERS.items():
         value = float(peer(sample))
@@ -157,8 +157,8 @@ def _solids(sight: Sight) -> Iterable[tuple[str, Mask, tuple[float, ...]]]:
     yield "Sauvola", values > local, ()
     for criterion in CRITERIA:
         inside, levels = np.zeros(values.shape, bool), []
-        for place, _ in sight.tiles:
-            part = np.ascontiguousarray(sight.above[place])
+        for place, _ in search.tiles:
+            part = np.ascontiguousarray(search.above[place])
             value = _by_edges(part, case.spacing_um, criterion)
             if value is not None:
                 inside[place] = part > value
@@ -257,13 +257,13 @@ def print_confidence(what: str, judged: list[tuple[float, float]]) -> None:
 
 def print_inner(cases: list[Figures]) -> None:
     """Print how good inner levels are, how many are missed, and how many are found in excess."""
-    within = [case for case in cases if case.rung]
-    missed = [case.name for case in within if case.rungs <= case.rung]
+    within = [case for case in cases if case.true_level]
+    missed = [case.name for case in within if case.level_count <= case.true_level]
     judged = [(c.confidence, c.found[OURS].dice) for c in within if c.name not in missed]
     print_confidence("an inner level", judged)
     print(f"\ninner levels that are missed: {len(missed)} of {len(within)} {missed}")
     alike = [case for case in cases if ", x 1," in case.name]  # bodies of equal brightness
-    further = sum(max(0, case.rungs - 1) for case in alike)
+    further = sum(max(0, case.level_count - 1) for case in alike)
     print(f"further levels on {len(alike)} volumes whose bodies are all alike: {further}")
 
 

@@ -20,7 +20,7 @@ from scipy import optimize
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from corpus import all_cases
-from corpus.sight import look_at
+from corpus.level_search import search_levels
 from stereocell.isosurface import level as bounds
 from stereocell.isosurface.level import Level, clear_of
 
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Ladder:
+class VolumeLevels:
     """One volume's levels.
 
     source    volumes of one source are held out together
@@ -51,22 +51,22 @@ class Ladder:
     likely: tuple[int, ...]
 
 
-def measure(number: int) -> Ladder:
+def measure(number: int) -> VolumeLevels:
     """Return the levels of one case of the corpus."""
     case = list(all_cases())[number]
-    sight = look_at(case)
-    levels, shown = sight.found.all_levels, sight.found.shown()
+    search = search_levels(case)
+    levels, shown = search.found.all_levels, search.found.shown()
     if clear_of(levels) and not shown:
         levels = ()  # noise or uneven light; no level is to be chosen
     clear = [k for k, level in enumerate(levels) if level in shown]
     scores = [
-        0.0 if sight.truth is None else dice(sight.values > level.value, sight.truth)
+        0.0 if search.truth is None else dice(search.values > level.value, search.truth)
         for level in levels
     ]
     near = [k for k, level in enumerate(levels) if clear and k < clear[0] and level.is_nearly_clear]
     rows = [_features(level, place) for place, level in enumerate(levels)]
     kind = case.name.split(",")[0] if case.source == "made" else case.source
-    return Ladder(
+    return VolumeLevels(
         case.name,
         kind,
         case.group == "empty",
@@ -98,9 +98,9 @@ def _features(level: Level, place: int) -> list[float]:
     ]
 
 
-def fit(ladders: Sequence[Ladder]) -> Array:
+def fit(volumes: Sequence[VolumeLevels]) -> Array:
     """Return the intercept and a coefficient for each feature, of a logistic function."""
-    known = [one for one in ladders if len(one.dice)]
+    known = [one for one in volumes if len(one.dice)]
     features = np.vstack([one.features for one in known])
     right = np.concatenate(
         [(one.dice >= RIGHT) & (one.dice >= one.dice.max() - 0.05) for one in known]
@@ -125,29 +125,29 @@ def main() -> None:
     """Print the table."""
     cases = [
         k for k, case in enumerate(all_cases())
-        if case.rung == 0 and case.group not in ("looked at", "nested")
+        if case.level == 0 and case.group not in ("looked at", "nested")
     ]  # fmt: skip
     with ProcessPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        ladders = list(pool.map(measure, cases))
+        volumes = list(pool.map(measure, cases))
     held_out = {}
-    for source in {one.source for one in ladders}:
-        b = fit([one for one in ladders if one.source != source])
-        held_out |= {one.name: score(b, one.features) for one in ladders if one.source == source}
+    for source in {one.source for one in volumes}:
+        b = fit([one for one in volumes if one.source != source])
+        held_out |= {one.name: score(b, one.features) for one in volumes if one.source == source}
     print("| choice | real volumes | made ones | surface on nothing |\n|---|---|---|---|")
-    _print("tests in a row", ladders, lambda one: one.tree)
+    _print("tests in a row", volumes, lambda one: one.tree)
     for least in THRESHOLDS:
         _print(
-            f"best score, if {least:g} or more", ladders,
+            f"best score, if {least:g} or more", volumes,
             lambda one, least=least: _best(held_out[one.name], range(len(one.dice)), least),
         )  # fmt: skip
     _print(
-        "best score of the clear and nearly clear", ladders,
+        "best score of the clear and nearly clear", volumes,
         lambda one: _best(held_out[one.name], one.likely, 0.0),
     )  # fmt: skip
     _print(
-        "best level by the truth", ladders, lambda one: _best(one.dice, range(len(one.dice)), 0.01)
+        "best level by the truth", volumes, lambda one: _best(one.dice, range(len(one.dice)), 0.01)
     )
-    coefficients = dict(zip(("intercept", *FEATURES), fit(ladders).round(2).tolist(), strict=True))
+    coefficients = dict(zip(("intercept", *FEATURES), fit(volumes).round(2).tolist(), strict=True))
     print(f"\nfitted on all: {coefficients}")
 
 
@@ -158,16 +158,18 @@ def _best(scores: Array, allowed: Sequence[int], least: float) -> int | None:
     return best if scores[best] >= least else None
 
 
-def _print(name: str, ladders: Sequence[Ladder], choose: Callable[[Ladder], int | None]) -> None:
+def _print(
+    name: str, volumes: Sequence[VolumeLevels], choose: Callable[[VolumeLevels], int | None]
+) -> None:
     real, made, empty = [], [], 0
     kinds = {case.name for case in all_cases() if case.source == "made"}
-    for one in ladders:
+    for one in volumes:
         place = choose(one)
         if one.is_empty:
             empty += place is not None
         else:
             (made if one.name in kinds else real).append(0.0 if place is None else one.dice[place])
-    count = sum(one.is_empty for one in ladders)
+    count = sum(one.is_empty for one in volumes)
     print(
         f"| {name} | {np.mean(real):.3f} of {len(real)} | {np.mean(made):.3f} of {len(made)} | "
         f"{empty} of {count} |"

@@ -105,10 +105,10 @@ def viewing(flags: list[str], folder: str) -> Iterator[tuple[subprocess.Popen[st
     ) as server:
         assert server.stdout is not None
         line = server.stdout.readline()
-        told = json.loads(line or "{}")
-        if "address" not in told:
-            raise SystemExit(f"{flags[0]}: {told.get('error', 'the command has ended')}")
-        address = told["address"]
+        answer = json.loads(line or "{}")
+        if "address" not in answer:
+            raise SystemExit(f"{flags[0]}: {answer.get('error', 'the command has ended')}")
+        address = answer["address"]
         get(address)
         try:
             yield server, address, began_s

@@ -31,17 +31,17 @@ def watch(arguments: list[str], others: list[psutil.Process]) -> Cost:
     cost, start = Cost(), time.perf_counter()
     before = sum(_cpu_of(other) for other in others)
     # A pipe that is not read would fill up and stop the command.
-    with tempfile.TemporaryFile("w+") as told:
+    with tempfile.TemporaryFile("w+") as errors:
         command = subprocess.Popen(
-            [*STEREOCELL, *arguments], stdout=subprocess.DEVNULL, stderr=told
+            [*STEREOCELL, *arguments], stdout=subprocess.DEVNULL, stderr=errors
         )
         parent, spent = psutil.Process(command.pid), dict[int, float]()
         while command.poll() is None:
             _look(parent, others, cost, spent)
             time.sleep(OFTEN_S)
         if command.returncode:
-            told.seek(0)
-            raise SystemExit(f"{' '.join(arguments)}: {told.read()[-2000:]}")
+            errors.seek(0)
+            raise SystemExit(f"{' '.join(arguments)}: {errors.read()[-2000:]}")
     cost.seconds = time.perf_counter() - start
     cost.cpu = sum(spent.values()) + sum(_cpu_of(other) for other in others) - before
     return cost

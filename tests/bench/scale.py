@@ -164,8 +164,8 @@ def print_slope(runs: list[Run]) -> list[float]:
                 role: most / own[few].peaks[role] - 1 for role, most in own[many].peaks.items()
             }
             growths += grown.values()
-            told = ", ".join(f"{role} {growth:+.1%}" for role, growth in grown.items())
-            print(f"    from {few} to {many} units: {told} (bound {MAX_GROWTH:+.0%})")
+            by_role = ", ".join(f"{role} {growth:+.1%}" for role, growth in grown.items())
+            print(f"    from {few} to {many} units: {by_role} (bound {MAX_GROWTH:+.0%})")
     return growths
 
 

@@ -65,8 +65,8 @@ def print_sizes(out: Path) -> None:
     first += [bundle / one["tileset"]["path"] for one in manifest["channels"] if one["tileset"]]
     print(f"  first picture, without the page {_bytes(*first) / MB:.2f} MB in {len(first)} files")
     for one in manifest["channels"]:
-        told = " ".join(f"{n:,}" for n in one["triangles"])
-        print(f"  {one['name']}: triangles by level {told}")
+        counts = " ".join(f"{n:,}" for n in one["triangles"])
+        print(f"  {one['name']}: triangles by level {counts}")
 
 
 def walk_over(bundle: Path) -> bool:

@@ -56,12 +56,12 @@ async def visit(address: str, seed: int, until: float, totals: Totals) -> None:
             await stream.send('{"type": "hello", "version": 1}')
             volume = '{"tile": "r0_c0", "channel": "CD31"}'
             await stream.send(f'{{"type": "open", "volumes": [{volume}]}}')
-            table, said = b"", None
-            while said is None or len(table) < said["table_bytes"]:
+            table, tree = b"", None
+            while tree is None or len(table) < tree["table_bytes"]:
                 data = await asyncio.wait_for(stream.recv(), 60)
                 if isinstance(data, str):
                     message = json.loads(data)
-                    said = message if message["type"] == "tree" else said
+                    tree = message if message["type"] == "tree" else tree
                     continue
                 frame = decode_frame(data)
                 table += frame.parts[0].data
@@ -96,10 +96,10 @@ async def look(stream, view: int, rng: random.Random, hashes: list[bytes], total
     while True:
         data = await asyncio.wait_for(stream.recv(), 60)
         if isinstance(data, str):
-            said = json.loads(data)
-            assert said["type"] == "done", said
-            if said["view"] == view:
-                totals.cancelled += said["reason"] == "cancelled"
+            answer = json.loads(data)
+            assert answer["type"] == "done", answer
+            if answer["view"] == view:
+                totals.cancelled += answer["reason"] == "cancelled"
                 break
             continue
         frame = decode_frame(data)
@@ -160,7 +160,7 @@ def main() -> int:
                 peak, last = (memory_mb(server.pid, n) for n in ("VmHWM", "VmRSS"))
             finally:
                 server.terminate()
-                _, said = server.communicate(timeout=20)
+                _, printed = server.communicate(timeout=20)
     views, s = totals.views, options.seconds
     print(f"{options.clients} clients, {s:g} s: {views:,} views ({views / s:.0f} a second),")
     print(f"{totals.cancelled:,} of them cancelled; {totals.bricks:,} bricks,")
@@ -171,8 +171,8 @@ def main() -> int:
         print(f"{name}: median {half * 1e3:.0f} ms, 95 % within {most * 1e3:.0f} ms")
     print(f"server: {start:.0f} MB at first, {last:.0f} MB at the end, peak {peak:.0f} MB")
     print(f"errors: {len(totals.errors)} {totals.errors[:3]}")
-    print(f"server ended with {server.returncode}, said {said!r}")
-    return 1 if totals.errors or said or server.returncode else 0
+    print(f"server ended with {server.returncode}, printed {printed!r}")
+    return 1 if totals.errors or printed or server.returncode else 0
 
 
 if __name__ == "__main__":

@@ -133,8 +133,8 @@ def chain(binary: Path, surface: Mesh, alpha: float, folder: Path) -> tuple[Mesh
     source, target = folder / "in.ply", folder / "out.ply"
     write_ply(source, surface)
     command = [binary, source, target, str(alpha), str(OFFSET * alpha)]
-    said = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    return read_ply(target), said["s_components"] + said["s_holes"] + said["s_wrap"]
+    printed = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    return read_ply(target), printed["s_components"] + printed["s_holes"] + printed["s_wrap"]
 
 
 def kept(mesh: Mesh) -> Mesh:

@@ -662,9 +662,9 @@ def run_forked(step, arguments):
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     code = 1
     try:
-        said = os.open(arguments["result"] + ".txt", os.O_WRONLY | os.O_CREAT)
-        os.dup2(said, 1)
-        os.dup2(said, 2)
+        output = os.open(arguments["result"] + ".txt", os.O_WRONLY | os.O_CREAT)
+        os.dup2(output, 1)
+        os.dup2(output, 2)
         run(step, arguments)
         code = 0
     except BaseException:

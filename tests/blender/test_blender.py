@@ -125,8 +125,8 @@ def test_changes_of_the_display_are_not_edits_of_a_material(
         "/Specimen/Channels/cells.stereocell:hiddenObjects"
     )
     assert attribute is None
-    ((kind, told),) = found["told"]
-    assert kind == "Info", told
+    ((kind, message),) = found["messages"]
+    assert kind == "Info", message
 
 
 def test_objects_have_their_columns_and_classes(cells: tuple[Path, Path], tmp_path: Path) -> None:
@@ -242,9 +242,9 @@ def test_a_function_of_more_points_than_a_ramp_holds_is_followed_closely(
     assert np.interp(x, *ramp.T) == pytest.approx(points[:, 1], abs=0.01)
     overlay = tmp_path / "edit.usda"
     edits = run("edit", tmp_path, stage=layer, representation="volume", overlay=overlay)
-    ((_, told),) = edits["told"]
-    assert "representation volume" in told
-    assert "opacities" not in told  # the ramp was not edited
+    ((_, message),) = edits["messages"]
+    assert "representation volume" in message
+    assert "opacities" not in message  # the ramp was not edited
 
 
 def test_an_import_has_the_channels_that_the_stage_shows_or_all(
@@ -281,7 +281,7 @@ def test_objects_and_materials_have_display_names(stage_path: Path, tmp_path: Pa
     assert found["volumes"][leaf("r0_c0", F_ID, "_volume")]["material"] == "CD31/µ 1 volume"
     # Names that the import gave are not edits.
     found = run("edit", tmp_path, stage=layer, overlay=overlay, representation="AS_STAGED")
-    assert found["told"] == [("Info", "0 edits: ")]
+    assert found["messages"] == [("Info", "0 edits: ")]
 
 
 def test_volumes_have_their_grid_place_and_transfer_function(
@@ -347,7 +347,7 @@ def test_an_export_without_edits_is_an_empty_layer(stage_path: Path, tmp_path: P
     found = run(
         "edit", tmp_path, stage=stage_path, overlay=overlay, representation="AS_STAGED", size="TRUE"
     )
-    assert found["told"] == [("Info", "0 edits: ")]
+    assert found["messages"] == [("Info", "0 edits: ")]
     layer = Sdf.Layer.FindOrOpen(str(overlay))
     assert not layer.GetPrimAtPath("/Specimen").nameChildren
     assert not Path(layer.subLayerPaths[0]).is_absolute()
@@ -420,10 +420,10 @@ def test_moved_points_are_carried_with_their_extent_normals_and_tangents(
         "edit", tmp_path, stage=stage_path, overlay=overlay, size=size, lod=lod,
         pull={LETTER: [1, top, 1.5]},
     )  # fmt: skip
-    ((kind, told),) = found["told"]
+    ((kind, message),) = found["messages"]
     assert kind == "Info"
-    assert f"{NAME}: points at {lod}" in told
-    assert ("finer levels keep their shape" in told) == (lod != "lod0")
+    assert f"{NAME}: points at {lod}" in message
+    assert ("finer levels keep their shape" in message) == (lod != "lod0")
     assert validate_stage(overlay) == []
     built, edited = (mesh_at(path, LETTER, lod) for path in (stage_path, overlay))
     before, after = (array(mesh.GetPointsAttr()) for mesh in (built, edited))
@@ -480,9 +480,9 @@ def test_moved_meshes_and_volumes_are_carried(stage_path: Path, tmp_path: Path, 
         "edit", tmp_path, stage=stage_path, overlay=overlay, size=size, representation="both",
         move={LETTER: [1.0, 2.0, 3.0], volume: [0.0, -4.0, 0.0]},
     )  # fmt: skip
-    ((kind, told),) = found["told"]
+    ((kind, message),) = found["messages"]
     assert kind == "Info"
-    assert "CD3_x3b5__r0_c0: moved" in told
+    assert "CD3_x3b5__r0_c0: moved" in message
     assert validate_stage(overlay) == []
     stage = Usd.Stage.Open(str(overlay))
     for path, expected in ((LETTER, (1, 2, 3)), (volume, (0, -4, 0)), (leaf("r0_c1", F_ID), None)):
@@ -532,9 +532,9 @@ def test_an_edit_that_a_layer_cannot_carry_is_listed_as_lost(
         "edit", tmp_path, stage=stage_path, overlay=tmp_path / "edit.usda", lod="lod2",
         representation="both", tiles="r0_c0", odd=[odd],
     )  # fmt: skip
-    ((kind, told),) = found["told"]
+    ((kind, message),) = found["messages"]
     assert kind == "Warning"
-    carried, lost = told.split(". Not carried: ")
+    carried, lost = message.split(". Not carried: ")
     assert words in lost
     assert lost.count("; ") == 0, lost
     assert "points" not in carried
@@ -556,8 +556,8 @@ def test_objects_that_an_artist_adds_reach_the_bundle(
 ) -> None:
     overlay, bundle = tmp_path / "edit.usda", tmp_path / "bundle"
     found = run("edit", tmp_path, stage=stage_path, overlay=overlay, size=size, odd=["decorate"])
-    ((kind, told),) = found["told"]
-    assert kind == "Info", told
+    ((kind, message),) = found["messages"]
+    assert kind == "Info", message
     assert validate_stage(overlay) == []
     assert [line for line in write(overlay, bundle) if "is not taken over" in line] == []
     manifest = load(bundle / "manifest.json")
@@ -606,7 +606,7 @@ def test_exposure_temperature_and_colors_above_white_reach_the_bundle(
 ) -> None:
     overlay, bundle = tmp_path / "edit.usda", tmp_path / "bundle"
     found = run("edit", tmp_path, stage=stage_path, overlay=overlay, odd=["shine"])
-    assert found["told"][0][0] == "Info", found["told"]
+    assert found["messages"][0][0] == "Info", found["messages"]
     lines = [line for line in write(overlay, bundle) if "is not taken over" in line]
     (lamp,) = [
         one for one in load(bundle / "manifest.json")["lights"]["lamps"] if "Ev" in one["name"]
@@ -633,8 +633,8 @@ def test_additions_of_an_earlier_export_are_moved_and_hidden(
         "edit", tmp_path, stage=first, overlay=second,
         move={f"{group}/box": (5, 0, 0)}, hide=[f"{group}/wire"], delete=[f"{group}/label"],
     )  # fmt: skip
-    ((kind, told),) = found["told"]
-    assert kind == "Info", told
+    ((kind, message),) = found["messages"]
+    assert kind == "Info", message
     write(second, tmp_path / "bundle")
     names = {one["name"] for one in load(tmp_path / "bundle/manifest.json")["additions"]["layers"]}
     assert names == {"arrow: here", "box"}

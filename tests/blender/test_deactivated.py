@@ -29,8 +29,8 @@ def test_edits_are_exported_over_a_stage_with_a_deactivated_part(
         color=color,
         odd=[],
     )  # fmt: skip
-    ((kind, told),) = found["told"]
-    assert kind == "Info", told
-    assert f"{BALL_ID}: colour" in told
-    assert F_ID not in told
+    ((kind, message),) = found["messages"]
+    assert kind == "Info", message
+    assert f"{BALL_ID}: colour" in message
+    assert F_ID not in message
     assert validate_stage(overlay) == []

@@ -44,15 +44,15 @@ def test_fewer_planes_carry_the_surface_of_a_sponge_and_a_note_says_so(
     out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["units", str(out), "--workers", "0"]) == 0
-    said = " ".join(capsys.readouterr().err.split())
+    printed = " ".join(capsys.readouterr().err.split())
     folder = OutFolder(out)
     plan, survey = folder.plan(), read_survey(folder)
     step = plan.with_grid(survey["sponge"].grid_um).step
-    assert "one plane in {}, {}, {} along z, y, x carries its surface".format(*step) in said
+    assert "one plane in {}, {}, {} along z, y, x carries its surface".format(*step) in printed
     assert survey["sponge"].most_faces > MAX_FACES
     assert step[1] > step[0] >= 1  # nearly the same distance along all axes
     assert survey["ball"].grid_um == 0
-    assert "ball: up to" not in said
+    assert "ball: up to" not in printed
     assert f"{MAX_FACES:,} (surface.max_faces)" in survey["sponge"].thinning(plan)
 
 

@@ -62,10 +62,10 @@ def test_a_table_is_left_out_of_the_volume_and_a_deep_check_agrees(
 ) -> None:
     without, with_table = tmp_path / "without", tmp_path / "with"
     assert make_assets(source, without, "1x1", "--workers", "0", plan=PRESET) == 0
-    said = capsys.readouterr().err
-    assert "left out, as no part of the body (a table, holder, pad or cable): " in said
-    assert "--keep-holder builds it" in said
-    assert "unsure" not in said
+    printed = capsys.readouterr().err
+    assert "left out, as no part of the body (a table, holder, pad or cable): " in printed
+    assert "--keep-holder builds it" in printed
+    assert "unsure" not in printed
     keep = (*PRESET, "--keep-holder")
     assert main(["plan", str(source), "-o", str(with_table), "--grid", "1x1", *keep]) == 0
     assert main(["units", str(with_table), "--workers", "0"]) == 0

@@ -16,7 +16,7 @@ from stereocell.objects.interfaces import Interfaces
 from stereocell.samples.cells import make_tissue
 from stereocell.steps import build_objects as objects_maker
 from support.exhaustive import sweep
-from support.label_builds import boxes, build, labels_of, objects_of, run, said
+from support.label_builds import boxes, build, labels_of, objects_of, printed, run
 from support.phantoms import write_ome_tiff
 
 SHAPE = (24, 48, 96)
@@ -34,9 +34,9 @@ def test_the_report_and_the_deep_check_describe_objects(
     assert run("report", out) == 0
     page = (out / "report/index.html").read_text("utf-8")
     assert f"cells: {count} objects</h3>" in page
-    said(capsys)
+    printed(capsys)
     assert run("check", out, "--deep", "--workers", 0) == 0
-    output = said(capsys)
+    output = printed(capsys)
     assert f"ok   cells against source: {count} objects" in output
     assert "ok   bundle against stage: 8 surfaces" in output
 
@@ -52,7 +52,7 @@ def test_the_report_and_the_deep_check_describe_objects(
     assert run("check", out, "--deep", "--workers", 0) == 1
     first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
     wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
-    assert wanted in said(capsys)
+    assert wanted in printed(capsys)
 
 
 @pytest.mark.slow
@@ -62,13 +62,13 @@ def test_levels_whose_simplification_stops_early_are_reported(
     write_ome_tiff(tmp_path / "l.ome.tif", boxes((3, 4, 20), shape=(16, 24, 24)))
     right = building.simplify_interfaces
 
-    def simplify_interfaces(walls: Interfaces, error: float, *given: Any, **named: Any) -> Any:
-        return (walls, False) if error > 0.2 else right(walls, error, *given, **named)
+    def simplify_interfaces(interfaces: Interfaces, error: float, *given: Any, **named: Any) -> Any:
+        return (interfaces, False) if error > 0.2 else right(interfaces, error, *given, **named)
 
     monkeypatch.setattr(building, "simplify_interfaces", simplify_interfaces)
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".")
     wanted = "l: simplifying lod3 stopped early in r0_c0, because triangles would have crossed"
-    output = said(capsys)
+    output = printed(capsys)
     assert wanted in output
     assert "lod2 has" not in output
     assert run("report", tmp_path / "out") == 0
@@ -100,9 +100,9 @@ def test_the_deep_check_measures_the_image_again(
 
     monkeypatch.setattr(objects_maker, "measure_intensities", measure)
     build(tmp_path / "i.ome.tif", tmp_path / "wrong", *flags)
-    said(capsys)
+    printed(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
-    output = said(capsys)  # on the last object of each tile
+    output = printed(capsys)  # on the last object of each tile
     assert f"cells: column {measure_of}_DNA is not the voxels' {measure_of} of 3, 8" in output
     assert output.count("voxels'") == 1
 
@@ -120,9 +120,9 @@ def test_the_deep_check_measures_the_surfaces_again(
 
     monkeypatch.setattr(objects_maker, "build_objects", build_objects)
     build(tmp_path / "l.ome.tif", tmp_path / "wrong", "--labels", ".")
-    said(capsys)
+    printed(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
-    assert "column area_um2 is not that of the surface of 3" in said(capsys)
+    assert "column area_um2 is not that of the surface of 3" in printed(capsys)
 
 
 @pytest.mark.slow
@@ -148,21 +148,21 @@ def test_the_deep_check_measures_the_interfaces_again(
 
     def build_objects(labels: np.ndarray, owned: np.ndarray, **named: Any) -> BuiltObjects:
         built = right(labels, owned, **named)
-        walls, areas = built.walls, built.wall_um2
+        interfaces, areas = built.interfaces, built.interface_um2
         if fault == "a wall too many":
-            walls = np.concatenate([walls, [[0, walls[0, 1] + 1]]]).astype(np.int32)
+            interfaces = np.concatenate([interfaces, [[0, interfaces[0, 1] + 1]]]).astype(np.int32)
             areas = np.append(areas, 0.01)
         elif fault == "a wall that is missing":
-            walls, areas = walls[1:], areas[1:]
+            interfaces, areas = interfaces[1:], areas[1:]
         elif fault == "smaller":
             areas = 0.7 * areas
-        return replace(built, walls=walls, wall_um2=areas)
+        return replace(built, interfaces=interfaces, interface_um2=areas)
 
     monkeypatch.setattr(objects_maker, "build_objects", build_objects)
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".", "--grid", grid)
-    said(capsys)
+    printed(capsys)
     assert run("check", tmp_path / "out", "--deep", "--workers", 0) == (fault != "none")
-    output = said(capsys)
+    output = printed(capsys)
     odd = {
         column
         for column in ("neighbours", "contact")

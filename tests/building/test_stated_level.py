@@ -363,7 +363,7 @@ def test_surfaces_by_name_are_found_levels_whatever_the_criterion_is(
 ) -> None:
     flags = ["--channels", "even", "--surfaces", "even=outer", "--workers", "0"]
     levels = []
-    for criterion in ("ladder", "adaptive", "edges"):
+    for criterion in ("levels", "adaptive", "edges"):
         out = tmp_path / criterion
         plain = ["-o", str(out), *flags[:4], "--iso-criterion", criterion]
         assert main(["plan", str(source), *plain]) == 0

@@ -45,8 +45,8 @@ def test_a_build_on_object_storage_has_the_bytes_of_a_local_one_and_leaves_no_fi
         assert main(["report", address]) == 0
         capsys.readouterr()
         _build(address, *source)
-        said = capsys.readouterr().err
-        assert [f"{name}: up to date" in said for name in ("units", "stage", "bundle")] == [
+        printed = capsys.readouterr().err
+        assert [f"{name}: up to date" in printed for name in ("units", "stage", "bundle")] == [
             True
         ] * 3
 

@@ -239,10 +239,10 @@ def test_a_torn_shell_is_reported_beside_noise(
     body, level = ThinBody("sphere", 1.5, 1, 0), (GROUND + BODY) / 2
     noisy = body.voxels(noise).round().clip(0).astype(np.uint16)
     cover, above = _cover_after(tmp_path, noisy, level, f"max_shift = {2000 / noise:g}")
-    said = " ".join(capsys.readouterr().err.split())
-    share = float(re.findall(r"leaves out (\d+)% of the source's", said)[0]) / 100
+    printed = " ".join(capsys.readouterr().err.split())
+    share = float(re.findall(r"leaves out (\d+)% of the source's", printed)[0]) / 100
     is_structure = above & (body.voxels() > level)
     lost = is_structure.sum() - cover.covered
     assert share == pytest.approx(lost / is_structure.sum(), abs=0.05)
     assert share > 0.1
-    assert REMEDY in said
+    assert REMEDY in printed

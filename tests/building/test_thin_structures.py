@@ -89,9 +89,9 @@ def test_plates_of_one_voxel_stay_on_any_plane(
     surface, cover = _surface(_built(tmp_path, _plates(first)))
     assert len(surface.split(only_watertight=True)) == 4
     assert cover.missing < 0.07  # the rest is voxels at the plates' edges
-    said = " ".join(capsys.readouterr().err.split())
-    assert "too thin for planes 1400 um apart (surface.grid_um)" in said
-    assert "all planes carry its surface" in said
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "too thin for planes 1400 um apart (surface.grid_um)" in printed
+    assert "all planes carry its surface" in printed
 
 
 @pytest.mark.parametrize("preset", ["ct", "ct-bone"])

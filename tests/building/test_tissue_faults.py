@@ -345,9 +345,9 @@ def test_a_damaged_file_is_reported_and_made_again(
         assert f"run `stereocell tissue {out}` again" in line
     monkeypatch.setattr(report, "run_report", lambda out: None)
     assert tissue(out) == 0
-    said = capfd.readouterr().err
-    assert Path(name).name in said
-    assert "OUT`" not in said
+    printed = capfd.readouterr().err
+    assert Path(name).name in printed
+    assert "OUT`" not in printed
     assert digests(out) == digests(undisturbed)
     assert faults(out) == []
 

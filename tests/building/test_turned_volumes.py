@@ -67,9 +67,9 @@ def _volume(lod: Lod) -> float:
 @pytest.mark.slow
 def test_level_noise_and_cover_do_not_depend_on_the_slice_axis(builds: list[Built]) -> None:
     first, *others = builds
-    assert first.survey.ladder
+    assert first.survey.levels
     for other in others:
-        for a, b in zip(first.survey.ladder, other.survey.ladder, strict=True):
+        for a, b in zip(first.survey.levels, other.survey.levels, strict=True):
             assert b.value == pytest.approx(a.value, rel=1e-3)
             assert b.confidence == pytest.approx(a.confidence, abs=0.01)
         levels = [one.survey.appearance.level for one in (first, other)]

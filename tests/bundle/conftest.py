@@ -26,7 +26,7 @@ def edit(stage, tmp_path):
 
     def export(change):
         path = edit_over(tmp_path / "edited.usda", stage, change)
-        export.told = write(path, tmp_path / "bundle")
+        export.lines = write(path, tmp_path / "bundle")
         return tmp_path / "bundle"
 
     return export

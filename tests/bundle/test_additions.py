@@ -27,7 +27,7 @@ def test_an_added_mesh_is_a_layer_with_its_place_name_and_color(edit):
         define_arrow(stage).GetPrim().SetDisplayName("Here")
 
     bundle = edit(change)
-    assert edit.told == []
+    assert edit.lines == []
     added = load(bundle / "manifest.json")["additions"]
     assert added["layers"] == [{"id": "/Specimen/Annotations/Arrow", "name": "Here"}]
     assert load(bundle / "files.json")["additions.glb"]["sha256"] == added["file"]["sha256"]
@@ -48,7 +48,7 @@ def test_an_added_mesh_has_the_material_that_is_bound_to_it(edit):
         UsdShade.MaterialBindingAPI.Apply(arrow.GetPrim()).Bind(material)
 
     bundle = edit(change)
-    assert edit.told == []
+    assert edit.lines == []
     (mesh,) = scene_of(bundle).values()
     assert mesh.visual.material.alphaMode == "BLEND"
     assert tuple(mesh.visual.material.baseColorFactor) == (255, 128, 0, 128)
@@ -111,7 +111,7 @@ def test_an_image_on_an_added_mesh_is_named(edit, tmp_path):
     words = (
         "image wood.png of /Specimen/Annotations/Arrow is not taken over: added meshes have none"
     )
-    assert words in edit.told
+    assert words in edit.lines
 
 
 def test_curves_whose_numbers_do_not_fit_are_refused(edit):
@@ -128,7 +128,7 @@ def test_an_added_mesh_inside_a_tile_moves_with_it(edit):
         UsdGeom.XformCommonAPI(stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")).SetTranslate((0, 0, 9))
 
     bundle = edit(change)
-    assert edit.told == []
+    assert edit.lines == []
     (mesh,) = scene_of(bundle).values()
     assert mesh.bounds[:, 2] == pytest.approx([13, 13])
 
@@ -137,7 +137,7 @@ def test_an_added_mesh_in_a_channel_s_branch_of_a_tile_is_a_layer(edit):
     """Only the tile's payload defines the branch."""
     path = f"{BRANCH}/Arrow"
     bundle = edit(lambda stage: define_arrow(stage, path))
-    assert edit.told == []
+    assert edit.lines == []
     assert [one["id"] for one in load(bundle / "manifest.json")["additions"]["layers"]] == [path]
 
 
@@ -163,7 +163,7 @@ def test_content_of_another_file_is_taken_over(edit, tmp_path, arc):
         prim.SetInstanceable(arc == "instance")
 
     bundle = edit(change)
-    assert edit.told == []
+    assert edit.lines == []
     manifest = load(bundle / "manifest.json")
     assert [one["id"] for one in manifest["additions"]["layers"]] == ["/Specimen/Kit/Arrow"]
     (mesh,) = scene_of(bundle).values()
@@ -190,7 +190,7 @@ def test_an_edit_in_a_payload_of_the_layer_is_reported(edit, tmp_path):
             .AddPayload("./kit.usda")
         )
     )
-    (line,) = edit.told
+    (line,) = edit.lines
     assert line.startswith("Cube /Specimen/Kit/Box is not taken over: nothing in the bundle")
 
 
@@ -222,7 +222,7 @@ def test_prototypes_of_an_instancer_are_not_drawn_where_they_are_defined(edit):
 
     bundle = edit(change)
     assert "additions" not in load(bundle / "manifest.json")
-    (line,) = edit.told
+    (line,) = edit.lines
     assert line.startswith("PointInstancer /Specimen/Many is not taken over")
 
 
@@ -254,5 +254,5 @@ def test_usds_default_subdivision_is_named(edit):
         define_arrow(stage).GetPrim().RemoveProperty("subdivisionScheme")
 
     edit(change)
-    (line,) = edit.told
+    (line,) = edit.lines
     assert line.startswith("subdivision of /Specimen/Annotations/Arrow, which is USD's default")

@@ -17,7 +17,7 @@ def test_edit_is_taken_over_refused_or_reported(bundle, edit, case):
             edit(case.change)
         return
     edited = edit(case.change)
-    lost = [line for line in edit.told if "is not taken over" in line]
+    lost = [line for line in edit.lines if "is not taken over" in line]
     if case.outcome == "taken":
         assert lost == []
         assert files(edited) != files(bundle)

@@ -64,7 +64,7 @@ def errors_um(bundle):
 @pytest.mark.slow
 def test_a_stage_without_hashes_or_edits_gives_the_same_bundle(bundle, stage, edit, tmp_path):
     assert files(edit(lambda s: None)) == files(bundle)
-    assert edit.told == []
+    assert edit.lines == []
     shutil.copytree(stage.parent, tmp_path / "old")
     for tile in (tmp_path / "old").rglob("tile.usdc"):
         layer = Sdf.Layer.FindOrOpen(str(tile))
@@ -76,8 +76,8 @@ def test_a_stage_without_hashes_or_edits_gives_the_same_bundle(bundle, stage, ed
             owner = layer.GetPrimAtPath(path.GetPrimOrPrimVariantSelectionPath())
             owner.RemoveProperty(layer.GetAttributeAtPath(path))
         layer.Save()
-    told = write(tmp_path / "old/stage.usda", tmp_path / "from_old")
-    assert told == []
+    lines = write(tmp_path / "old/stage.usda", tmp_path / "from_old")
+    assert lines == []
     assert files(tmp_path / "from_old") == files(bundle)
 
 
@@ -93,7 +93,7 @@ def test_coarser_levels_are_made_again_from_an_edited_finest_level(bundle, edit)
     assert 0 == stated["lod0"] < stated["lod1"] <= stated["lod2"] < 1
     assert stated["lod1"] != errors_um(bundle)["lod1"]
     other = "channels/CD31/r0_c1/lod1.glb"
-    (line,) = edit.told
+    (line,) = edit.lines
     assert line.startswith("r0_c0/CD31: edited by hand: lod0 (sound); made anew from lod0: lod1 ")
     assert "lod2 within" in line
     assert read((edited / other).read_bytes())[0]["meshes"]  # the neighbour is not touched
@@ -126,7 +126,7 @@ def test_an_edited_coarser_level_stays_and_states_its_distance(bundle, edit):
     stated = errors_um(edited)
     assert stated["lod1"] == pytest.approx(0.25 * spheres.RADIUS + 0.02, rel=0.1)
     assert stated["lod2"] >= stated["lod1"]
-    (line,) = edit.told
+    (line,) = edit.lines
     assert "lod1 (sound) " in line
     assert line.endswith(" um from lod0, which is as it was built")
 
@@ -140,7 +140,7 @@ def test_other_levels_that_the_artist_edited_stay(edit):
     assert np.abs(radii(edited, "lod1") - 1.25 * spheres.RADIUS).max() < RISE
     assert np.abs(radii(edited, "lod2") - 1.5 * spheres.RADIUS).max() < 0.05
     assert errors_um(edited)["lod2"] == pytest.approx(0.25 * spheres.RADIUS, rel=0.2)
-    (line,) = edit.told
+    (line,) = edit.lines
     assert "lod2 (sound) stays, " in line
 
 
@@ -171,7 +171,7 @@ def test_another_topology_reaches_all_levels(edit, place):
         places = decoded_positions_m(data) * 1e6 - away
         assert np.abs(np.abs(places).sum(axis=1) - 1.5).max() < 0.05
     assert channel(edited)["triangles"][0] > 8  # includes the neighbour's triangles
-    (line,) = edit.told
+    (line,) = edit.lines
     assert "lod0 (sound)" in line
 
 
@@ -182,7 +182,7 @@ def test_faults_of_an_edited_mesh_are_reported(edit):
         mesh.GetFaceVertexIndicesAttr().Set(list(mesh.GetFaceVertexIndicesAttr().Get())[:-120])
 
     edit(lambda s: in_level(s, "lod0", open_it))
-    assert " open edges" in edit.told[0]
+    assert " open edges" in edit.lines[0]
 
     def cross_it(mesh):
         far = spheres.CENTER - (3.3, 0, 0)
@@ -195,7 +195,7 @@ def test_faults_of_an_edited_mesh_are_reported(edit):
         set_points(mesh, move)
 
     edit(lambda s: in_level(s, "lod0", cross_it))
-    assert " crossings" in edit.told[0] or "without area" in edit.told[0]
+    assert " crossings" in edit.lines[0] or "without area" in edit.lines[0]
 
 
 def empty(mesh):
@@ -204,27 +204,27 @@ def empty(mesh):
 
 
 @pytest.mark.parametrize(
-    ("level", "change", "left", "told"),
+    ("level", "change", "left", "expected"),
     [
         ("lod0", empty, [], ["lod0 is empty: no surface is left"]),
         ("lod1", empty, ["lod2.glb", "lod0.glb"], ["lod1 is empty and left out"]),
         ("lod0", lambda mesh: mesh.GetPrim().SetActive(False), ["lod2.glb", "lod1.glb"], []),
     ],
 )
-def test_emptied_or_inactive_level_is_left_out(edit, level, change, left, told):
+def test_emptied_or_inactive_level_is_left_out(edit, level, change, left, expected):
     edited = edit(lambda s: in_level(s, level, change))
     if left:
         assert chain(edited, "r0_c0") == left
     else:
         assert not (edited / "channels/CD31/r0_c0").exists()
-    assert edit.told == [f"r0_c0/CD31: edited by hand: {line}" for line in told]
+    assert edit.lines == [f"r0_c0/CD31: edited by hand: {line}" for line in expected]
 
 
 def test_a_mesh_that_is_moved_as_a_whole_keeps_its_levels(bundle, edit):
     edited = edit(
         lambda s: UsdGeom.XformCommonAPI(s.GetPrimAtPath(MESH)).SetTranslate((-1, 2, 0.5))
     )
-    assert edit.told == []
+    assert edit.lines == []
     assert errors_um(edited) == errors_um(bundle)
     assert np.abs(radii(edited, "lod1", (-1, 2, 0.5)) - spheres.RADIUS).max() < 0.01
 
@@ -237,7 +237,7 @@ def test_a_transform_of_the_finest_level_alone_is_an_edit(edit):
     )
     for level in ("lod0", "lod1", "lod2"):
         assert np.abs(radii(edited, level, (-1, 2, 0.5)) - spheres.RADIUS).max() < RISE
-    assert "made anew from lod0: lod1" in edit.told[0]
+    assert "made anew from lod0: lod1" in edit.lines[0]
 
 
 @pytest.mark.slow
@@ -250,8 +250,8 @@ def test_edit_in_place_and_flattened_edit_are_recognised(stage, edit, tmp_path):
         swell(1.25)(UsdGeom.Mesh(own.GetPrimAtPath("/r0_c0/CD31/CD31_r0_c0")))
     variants.SetVariantSelection("lod1")
     own.GetRootLayer().Save()
-    told = write(tmp_path / "own/stage.usda", tmp_path / "a")
-    (line,) = told
+    lines = write(tmp_path / "own/stage.usda", tmp_path / "a")
+    (line,) = lines
     assert "lod0 (sound); made anew from lod0: lod1" in line
     assert np.abs(radii(tmp_path / "a", "lod2") - 1.25 * spheres.RADIUS).max() < RISE
 
@@ -260,9 +260,9 @@ def test_edit_in_place_and_flattened_edit_are_recognised(stage, edit, tmp_path):
     tile = whole.GetPrimAtPath("/Specimen/Tiles/r0_c0")
     tile.GetVariantSet("lod").SetVariantSelection("lod0")
     whole.Export(str(tmp_path / "flat.usda"))
-    told = write(tmp_path / "flat.usda", tmp_path / "flat")
-    assert "flat.usda: flattened, so edits that no bundle takes over can't be found" in told[0]
-    assert told[1:] == ["r0_c0/CD31: edited by hand: lod0 (sound)"]
+    lines = write(tmp_path / "flat.usda", tmp_path / "flat")
+    assert "flat.usda: flattened, so edits that no bundle takes over can't be found" in lines[0]
+    assert lines[1:] == ["r0_c0/CD31: edited by hand: lod0 (sound)"]
 
 
 def test_points_in_other_units_are_reported(stage, tmp_path):
@@ -278,8 +278,8 @@ def test_points_in_other_units_are_reported(stage, tmp_path):
     specimen.specifier = Sdf.SpecifierDef
     specimen.referenceList.prependedItems = [Sdf.Reference("./an artist's.usda", "/Specimen")]
     root.Save()
-    told = write(tmp_path / "root.usda", tmp_path / "bundle")
-    (line,) = told
+    lines = write(tmp_path / "root.usda", tmp_path / "bundle")
+    (line,) = lines
     assert "points of an artist's.usda, whose metersPerUnit is 0.01, are taken as um" in line
 
 
@@ -322,8 +322,8 @@ def test_remade_levels_have_occlusion_and_paint_of_the_edited_level(tmp_path, fi
     path = edit_over(
         tmp_path / "edit.usda", "./stage.usda", lambda s: in_level(s, "lod0", swell(1.25))
     )
-    told = write(path, tmp_path / "bundle")
-    (line,) = told
+    lines = write(path, tmp_path / "bundle")
+    (line,) = lines
     assert "made anew from lod0: lod1" in line
     with loaded(open_stage(tmp_path / "edit.usda"), "r0_c0") as (prim, _):
         _, lod, _ = shown_lods(prim, "CD31").lods

@@ -257,7 +257,7 @@ def test_display_colors_at_points_are_those_of_the_vertices(edit):
             colors.Set([Gf.Vec3f(0, k % 2, 1) for k in range(count)])
 
     edited = edit(change)
-    assert edit.told == []
+    assert edit.lines == []
     document, _ = read((edited / "channels/CD31/r0_c0/lod0.glb").read_bytes())
     assert "COLOR_0" in document["meshes"][0]["primitives"][0]["attributes"]
     assert factor(edited) == [1, 1, 1, 1]
@@ -284,31 +284,31 @@ def bind(stage, where, *, strength="strongerThanDescendants", purpose=""):
 @pytest.mark.parametrize("where", ["/Specimen", "/Specimen/Tiles", "/Specimen/Tiles/r0_c1"])
 def test_material_bound_above_the_channels_colours_surfaces_and_is_named(edit, where):
     edited = edit(lambda s: bind(s, where))
-    (told,) = edit.told
-    assert told.startswith(f"material /Specimen/Mine, bound on {where}, is taken over for surfaces")
-    assert "volumes keep the channels' colours: inputs:color of /Specimen/Channels/NAME" in told
+    (line,) = edit.lines
+    assert line.startswith(f"material /Specimen/Mine, bound on {where}, is taken over for surfaces")
+    assert "volumes keep the channels' colours: inputs:color of /Specimen/Channels/NAME" in line
     assert factor(edited, "r0_c1") == [0, 1, 0, 1]
     assert (factor(edited) == [0, 1, 0, 1]) == (where != "/Specimen/Tiles/r0_c1")
     assert channel(edited)["color"] == [1.0, 0.2, 0.1]
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "expected"),
     [
         ({"strength": "weakerThanDescendants"}, "the channels' own materials are stronger"),
         ({"purpose": "preview"}, "it is bound for the purpose 'preview' alone"),
         ({"purpose": "full"}, "it is bound for the purpose 'full' alone"),
     ],
 )
-def test_a_material_that_reaches_no_surface_is_named(edit, options, told):
+def test_a_material_that_reaches_no_surface_is_named(edit, options, expected):
     edited = edit(lambda s: bind(s, "/Specimen", **options))
-    assert [told in line and "is not taken over" in line for line in edit.told] == [True]
+    assert [expected in line and "is not taken over" in line for line in edit.lines] == [True]
     assert factor(edited) == [1.0, 0.2, 0.1, 1]
 
 
 def test_a_material_that_is_bound_nowhere_is_named(edit):
     edit(lambda s: bind(s, ""))
-    assert edit.told == ["Material /Specimen/Mine is not taken over: no mesh is bound to it"]
+    assert edit.lines == ["Material /Specimen/Mine is not taken over: no mesh is bound to it"]
 
 
 def test_moved_tile_moves_its_boxes_meshes_and_volumes(bundle, edit):

@@ -72,7 +72,7 @@ def test_stage_with_unedited_lights_keeps_the_viewers_own_lamps(bundle):
 def test_stage_without_lights_keeps_the_viewers_lamps_and_a_line_states_it(edit):
     bundle = edit(lambda stage: stage.GetPrimAtPath(LIGHTS).SetActive(False))
     assert lights_of(bundle) is None
-    assert ["no light of its own" in line for line in edit.told] == [True]
+    assert ["no light of its own" in line for line in edit.lines] == [True]
 
 
 def test_distant_light_is_as_bright_as_usdlux_defines(edit):
@@ -86,7 +86,7 @@ def test_distant_light_is_as_bright_as_usdlux_defines(edit):
         sun.AddRotateYOp().Set(90.0)
 
     found = lights_of(edit(change))
-    assert edit.told == []
+    assert edit.lines == []
     (lamp,) = found["lamps"]
     # Radiance over the cone of one degree, weighted by the cosine; white reflects 1 / pi of it.
     angle = np.linspace(0, np.radians(1), 20001)
@@ -147,7 +147,7 @@ def test_weakest_of_more_than_three_lamps_are_named(edit):
 
     names = [lamp["name"] for lamp in lights_of(edit(change))["lamps"]]
     assert names == ["L3", "L2", "L1"]
-    assert ["'L0' is not taken over" in line for line in edit.told] == [True]
+    assert ["'L0' is not taken over" in line for line in edit.lines] == [True]
 
 
 def test_a_lamp_that_is_too_bright_is_named(edit):
@@ -155,7 +155,7 @@ def test_a_lamp_that_is_too_bright_is_named(edit):
         UsdLux.LightAPI(stage.GetPrimAtPath(f"{LIGHTS}/key")).CreateIntensityAttr(100.0)
 
     assert lights_of(edit(change))["lamps"][0]["strength"] == 10
-    assert ["brightness of light 'key'" in line for line in edit.told] == [True]
+    assert ["brightness of light 'key'" in line for line in edit.lines] == [True]
 
 
 @pytest.mark.parametrize("turn", [None, (0, 90, 0), (40, -70, 20)])
@@ -175,7 +175,7 @@ def test_turned_dome_shines_from_the_direction_that_usd_gives(edit, tmp_path, tu
         change.world = np.array(dome.ComputeLocalToWorldTransform(0))[:3, :3]
 
     bundle = edit(change)
-    assert edit.told == []
+    assert edit.lines == []
     found = room_of(bundle)
     assert middle_of_light(found) == pytest.approx(shines_at @ change.world, abs=0.02)
     assert found.max(axis=(0, 1)) == pytest.approx([2, 1, 0.5], rel=0.01)

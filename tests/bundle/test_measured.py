@@ -31,8 +31,8 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def build(source: Path, out: Path, *flags: str) -> Path:
-    told = ("--iso-value", "F=150", "--preset", "none", *flags)
-    assert make_assets(source, out, "2x1", "--workers", "0", plan=told) == 0
+    arguments = ("--iso-value", "F=150", "--preset", "none", *flags)
+    assert make_assets(source, out, "2x1", "--workers", "0", plan=arguments) == 0
     return out
 
 
@@ -63,9 +63,9 @@ def test_an_edited_window_gives_the_volumes_of_a_build_with_it(
 ) -> None:
     edited = bundle_over(built, tmp_path)
     low, high = WINDOW
-    anew = build(source, tmp_path / "anew", "--window", f"F={low}:{high}") / "bundle"
+    direct = build(source, tmp_path / "direct", "--window", f"F={low}:{high}") / "bundle"
     assert len(volumes(edited)) == 4  # textures and bricks of two tiles
-    assert volumes(edited) == volumes(anew)
+    assert volumes(edited) == volumes(direct)
     assert volumes(edited) != volumes(built / "bundle")
 
 
@@ -84,7 +84,7 @@ def test_8_bits_leave_out_measured_voxels_and_the_log_states_their_size(
     edited = bundle_over(small, tmp_path)
     assert volumes(edited) != volumes(bundle_over(built, tmp_path / "of_16"))
     build(source, tmp_path / "whole")
-    told = capsys.readouterr().err
+    printed = capsys.readouterr().err
     records = [json.loads(path.read_text("utf-8")) for path in built.glob("units/*/stage.json")]
     assert len(records) == 2
     measured = sum(record["measured_bytes"] for record in records)
@@ -94,5 +94,5 @@ def test_8_bits_leave_out_measured_voxels_and_the_log_states_their_size(
     )
     # The rest is the head of each grid: its name, type and offsets.
     assert 0 < large - bare - measured < 200
-    assert f"stage: {measured / 1e6:.1f} of " in told
-    assert "--bits 8 leaves them out" in told
+    assert f"stage: {measured / 1e6:.1f} of " in printed
+    assert "--bits 8 leaves them out" in printed

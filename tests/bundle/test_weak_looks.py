@@ -43,7 +43,7 @@ def colors_of(stage: Usd.Stage, root: str = "/Specimen") -> set[tuple[float, ...
 @pytest.mark.parametrize("way", LAYERED)
 def test_edit_over_the_stage_recolours_a_channel_and_its_bundle(edit, tmp_path, way):
     bundle = edit(LAYERED[way])
-    assert [line for line in edit.told if "is not taken over" in line] == []
+    assert [line for line in edit.lines if "is not taken over" in line] == []
     assert colors_of(Usd.Stage.Open(str(tmp_path / "edited.usda"))) == {GREEN}
     assert channel(bundle)["color"] == list(GREEN)
 
@@ -87,9 +87,9 @@ def test_a_variant_set_above_a_specimen_recolours_it_alone(scene, tmp_path):
     for name, other in (("A", "B"), ("B", "A")):
         scene.GetPrimAtPath(f"/World/{name}").SetActive(True)
         scene.GetPrimAtPath(f"/World/{other}").SetActive(False)
-        told, bundle = bundle_of(scene, tmp_path / f"of_{name}")
+        lines, bundle = bundle_of(scene, tmp_path / f"of_{name}")
         assert (channel(bundle)["color"] == list(GREEN)) == (name == "A")
-        assert [line for line in told if "is not taken over" in line] == []
+        assert [line for line in lines if "is not taken over" in line] == []
 
 
 @pytest.mark.parametrize("place", ["/_look", "/__class__/Specimen"])
@@ -103,9 +103,9 @@ def test_one_class_recolours_all_specimens_of_a_scene(scene, tmp_path, place):
             scene.GetPrimAtPath(f"/World/{name}").GetInherits().AddInherit(place)
     assert colors_of(scene, "/World/A") == colors_of(scene, "/World/B") == {GREEN}
     scene.GetPrimAtPath("/World/A").SetActive(False)
-    told, bundle = bundle_of(scene, tmp_path)
+    lines, bundle = bundle_of(scene, tmp_path)
     assert channel(bundle)["color"] == list(GREEN)
-    assert [line for line in told if "is not taken over" in line] == []
+    assert [line for line in lines if "is not taken over" in line] == []
 
 
 def test_a_scene_of_several_specimens_is_refused_by_their_names(scene, tmp_path):
@@ -128,12 +128,12 @@ def test_scene_may_rename_and_move_a_specimen(tmp_path, arc):
     ).Set(Gf.Vec3f(*GREEN))
     edit_cases.define_arrow(scene, "/World/Shelf/Liver/Arrow")
     edit_cases.define_arrow(scene, "/World/Shelf/Arrow")
-    told, bundle = bundle_of(scene, tmp_path)
+    lines, bundle = bundle_of(scene, tmp_path)
     manifest = read_manifest(bundle)
     assert manifest["specimen"]["name"] == "two tiles"
     assert manifest["specimen"]["bounds_um"]["min"][0] == 100
     assert [layer["name"] for layer in manifest["additions"]["layers"]] == ["Arrow"]
-    lost = [line for line in told if "is not taken over" in line]
+    lost = [line for line in lines if "is not taken over" in line]
     assert ["inputs:colour" in lost[0], "outside /World/Shelf/Liver" in lost[1]] == [True, True]
     assert len(lost) == 2
 
@@ -163,8 +163,8 @@ def test_a_library_of_looks_among_the_sublayers_reaches_the_bundle(stage, tmp_pa
         composed.GetRootLayer().subLayerPaths.append("./library.usda")
 
     written = edit_over(tmp_path / "edited.usda", stage, add)
-    told = write(written, tmp_path / "bundle")
-    assert [line for line in told if "is not taken over" in line] == []
+    lines = write(written, tmp_path / "bundle")
+    assert [line for line in lines if "is not taken over" in line] == []
     assert channel(tmp_path / "bundle")["color"] == list(GREEN)
 
 

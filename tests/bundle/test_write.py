@@ -307,12 +307,17 @@ def test_resumed_bundle_names_edited_layers_of_finished_tiles(tmp_path):
     layer = Sdf.Layer.FindOrOpen(str(edited))
     layer.documentation = "a long note " * 200
     layer.Save()
-    told = []
+    lines = []
     for name in ("first", "again"):  # the second bundle uses the finished tiles of the first
-        told.append([])
+        lines.append([])
         write_bundle(
-            stage, tmp_path / name, None, engine=Engine(0), parts=parts, report_line=told[-1].append
+            stage,
+            tmp_path / name,
+            None,
+            engine=Engine(0),
+            parts=parts,
+            report_line=lines[-1].append,
         )
-    assert [line for line in told[0] if line.startswith(f"{edited}: changed since")]
-    assert told[1] == told[0]
+    assert [line for line in lines[0] if line.startswith(f"{edited}: changed since")]
+    assert lines[1] == lines[0]
     assert files(tmp_path / "again") == files(tmp_path / "first")

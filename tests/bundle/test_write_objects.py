@@ -158,8 +158,8 @@ def test_an_object_in_two_tiles_has_one_row(tmp_path):
 
 
 def test_neighbours_are_listed_for_both_objects(tmp_path):
-    walls = np.array([[0, 1], [1, 2], [0, 4]], np.int32)
-    content = written(tmp_path, table(labels=range(1, 6), walls=walls))
+    interfaces = np.array([[0, 1], [1, 2], [0, 4]], np.int32)
+    content = written(tmp_path, table(labels=range(1, 6), interfaces=interfaces))
     first = load(tmp_path, content["neighbours"]["first"], "<u4")
     rows = load(tmp_path, content["neighbours"]["rows"], "<u4")
     found = [rows[first[i] : first[i + 1]].tolist() for i in range(5)]

@@ -33,8 +33,8 @@ def test_the_flags_of_a_plan_are_found() -> None:
 
 @pytest.mark.parametrize("flag", FLAGS)
 def test_two_hyphens_are_no_value(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
-    told = f"{flag} is '--', expected a value (a file of this name is ./--)"
-    assert refusal(capsys, [*PLAN, f"{flag}=--"]) == told
+    expected = f"{flag} is '--', expected a value (a file of this name is ./--)"
+    assert refusal(capsys, [*PLAN, f"{flag}=--"]) == expected
 
 
 def test_two_hyphens_are_no_value_of_other_commands(capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,7 +51,7 @@ def test_values_below_zero_are_joined_to_their_flags() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "expected"),
     [
         ([*PLAN, "--channels", "\udcff"], "--channels is '\\xff', expected UTF-8"),
         ([*PLAN, "--preset=a\udce9"], "--preset is 'a\\xe9', expected UTF-8"),
@@ -64,9 +64,9 @@ def test_values_below_zero_are_joined_to_their_flags() -> None:
     ],
 )
 def test_bytes_that_are_not_utf8_are_named(
-    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    words: list[str], expected: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert refusal(capsys, words).startswith(told)
+    assert refusal(capsys, words).startswith(expected)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="arguments of Windows are no bytes")
@@ -82,8 +82,8 @@ def test_settings_that_are_not_utf8_name_the_line(
 ) -> None:
     file = tmp_path / "mine.toml"
     file.write_bytes(b'[plan]\ngrid = "\xff"\n')
-    told = f"{file}: line 2: found byte 0xff, expected UTF-8"
-    assert refusal(capsys, ["settings", "--config", str(file)]).startswith(told)
+    expected = f"{file}: line 2: found byte 0xff, expected UTF-8"
+    assert refusal(capsys, ["settings", "--config", str(file)]).startswith(expected)
 
 
 @pytest.mark.parametrize("flag", ["--preset", "--config", "--grid", "--columns", "--iso-value"])

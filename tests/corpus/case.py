@@ -25,8 +25,8 @@ class Case:
                 the volume is empty or the truth is unknown
     grid        rows and columns of the tiles that the volume is cut into
     held_out    whether no constant was chosen on this volume
-    rung        level of the surface that the truth belongs to: 0 is the outer one, 1 the next one
-                inside it
+    level       index of the level whose surface the truth belongs to: 0 is the outer one, 1
+                the next one inside it
     source      origin of the volume; volumes of one source are held out together
     """
 
@@ -37,5 +37,5 @@ class Case:
     kind: Kind = "microscopy"
     grid: tuple[int, int] = (2, 2)
     held_out: bool = False
-    rung: int = 0
+    level: int = 0
     source: str = "made"

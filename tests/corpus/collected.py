@@ -46,7 +46,7 @@ _TABLE: tuple[tuple[str, str, Kind, Group, int], ...] = (
 
 def collected_cases(folder: Path) -> Iterator[Case]:
     """Yield the volumes that the folder has. `missing` lists the other names."""
-    for name, source, kind, group, rung in _TABLE:
+    for name, source, kind, group, level in _TABLE:
         path = folder / f"{name}.npz"
         if not path.is_file():
             continue
@@ -59,7 +59,7 @@ def collected_cases(folder: Path) -> Iterator[Case]:
             partial(_load, path),
             kind=kind,
             held_out=True,
-            rung=rung,
+            level=level,
             source=source,
         )
 

@@ -282,7 +282,7 @@ def nested_cases() -> Iterator[Case]:
             SPACING,
             partial(_nested, photons, times),
             held_out=count % 2 == 1,
-            rung=1,
+            level=1,
         )
 
 

@@ -38,9 +38,9 @@ def real_cases() -> Iterator[Case]:
     yield Case(
         "ovule walls", "labelled", (0.235, 0.15, 0.15), lambda: _ovule(folder), source="PlantSeg"
     )
-    for name, hu, rung in (("CT skin", SKIN_HU, 0), ("CT bone", BONE_HU, 1)):
+    for name, hu, level in (("CT skin", SKIN_HU, 0), ("CT bone", BONE_HU, 1)):
         yield Case(
-            name, "outlined", _CT_SPACING, lambda hu=hu: _ct(folder, hu), kind="CT", rung=rung,
+            name, "outlined", _CT_SPACING, lambda hu=hu: _ct(folder, hu), kind="CT", level=level,
             source="dcm_qa_ct",
         )  # fmt: skip
     yield Case(

@@ -124,7 +124,7 @@ def test_a_cluster_that_does_not_see_out_is_refused(cluster: Joined, tmp_path: P
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "ours", "said"),
+    ("name", "ours", "expected"),
     [
         ("version", lambda _: "99", r"on .*: has StereoCell .*, expected 99"),
         ("all_libraries", lambda: {"numpy": "99"}, r"on .*: has numpy .*, expected 99"),
@@ -137,10 +137,10 @@ def test_a_cluster_that_does_not_see_out_is_refused(cluster: Joined, tmp_path: P
     ],
 )
 def test_workers_that_would_make_other_bytes_are_refused(
-    cluster: Joined, monkeypatch: pytest.MonkeyPatch, name: str, ours: object, said: str
+    cluster: Joined, monkeypatch: pytest.MonkeyPatch, name: str, ours: object, expected: str
 ) -> None:
     monkeypatch.setattr(f"stereocell.engine.cluster.{name}", ours)
-    with pytest.raises(ClusterError, match=rf"worker tls://.* {said}"):
+    with pytest.raises(ClusterError, match=rf"worker tls://.* {expected}"):
         join(cluster[0], None)
 
 

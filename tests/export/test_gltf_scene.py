@@ -102,10 +102,10 @@ def test_gltf_has_points_edited_by_hand_and_a_coarser_level_of_a_tile(
 
     layer = edited(change)
     for lod in (0, 1):  # coarser levels are made again from the edited level
-        told: list[str] = []
-        export_stage(layer, tmp_path / "s.glb", options=ExportOptions(lod=lod), report=told.append)
-        assert any(line.startswith("r0_c0/CD31: edited by hand: lod0") for line in told)
-        assert told[-1] == "2/2 r0_c1"
+        lines: list[str] = []
+        export_stage(layer, tmp_path / "s.glb", options=ExportOptions(lod=lod), report=lines.append)
+        assert any(line.startswith("r0_c0/CD31: edited by hand: lod0") for line in lines)
+        assert lines[-1] == "2/2 r0_c1"
         meshes = trimesh.load(tmp_path / "s.glb").geometry
         high = meshes["CD31 r0_c0"].bounds[1] * 1e6
         assert high[1] == pytest.approx(spheres.CENTER[1] + spheres.RADIUS + 2, abs=0.05)
@@ -258,8 +258,8 @@ def test_khronos_validator_finds_no_error_and_three_opens_it(
         export_stage(sphere_stage, tmp_path / name, options=options)
     files = sorted(map(str, tmp_path.iterdir()))
     command = [node, "--input-type=module", "-e", NODE, *files]
-    told = subprocess.run(command, cwd=VIEWER, capture_output=True, text=True, check=True)
-    for file, found in json.loads(told.stdout).items():
+    printed = subprocess.run(command, cwd=VIEWER, capture_output=True, text=True, check=True)
+    for file, found in json.loads(printed.stdout).items():
         issues = found["issues"]
         assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"][:3]
         if "draco" not in file:  # three decodes draco only in a browser's worker

@@ -80,12 +80,12 @@ def test_3mf_has_closed_and_whole_objects(stage: Path, tmp_path: Path) -> None:
 def test_some_of_many_thin_parts_are_named_and_all_are_counted(
     stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(print_solids, "_MAX_TOLD", 1)
-    told = export_stage(stage, tmp_path / "o.3mf", options=ExportOptions(scale=1, wall_mm=5)).split(
-        "\n"
-    )
-    assert len(told) == 3
-    assert told[2] == f"... and of {len(NAMES) - 1} more parts"
+    monkeypatch.setattr(print_solids, "_MAX_REPORTED", 1)
+    lines = export_stage(
+        stage, tmp_path / "o.3mf", options=ExportOptions(scale=1, wall_mm=5)
+    ).split("\n")
+    assert len(lines) == 3
+    assert lines[2] == f"... and of {len(NAMES) - 1} more parts"
 
 
 def test_export_of_a_label_maps_volume_is_refused(stage: Path, tmp_path: Path) -> None:

@@ -50,17 +50,17 @@ def test_a_picture_opens_with_the_channels_that_the_stage_shows(
                 UsdGeom.Imageable(prim).MakeInvisible()
 
     layer, small = edited(show_one), ExportOptions(width=64)
-    said = "CD31 alone, as the viewer opens: --channels takes others"
-    for file, options, is_said in (
+    note = "CD31 alone, as the viewer opens: --channels takes others"
+    for file, options, is_reported in (
         ("s.png", small, True),
         ("t.png", replace(small, channels=("CD31", "Hoechst 33342")), False),
         ("s.usdz", ExportOptions(), True),
         ("s.glb", ExportOptions(), True),
         ("s.stl", ExportOptions(), False),
     ):
-        told: list[str] = []
-        export_stage(layer, tmp_path / file, options=options, report=told.append)
-        assert (said in told) == is_said
+        lines: list[str] = []
+        export_stage(layer, tmp_path / file, options=options, report=lines.append)
+        assert (note in lines) == is_reported
     chosen = Chosen(layer, small)
     chosen.show_as_viewer()
     assert [channel.name for channel in chosen.channels] == ["CD31"]

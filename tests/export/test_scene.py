@@ -70,7 +70,7 @@ class Page(HTMLParser):
 
 
 def least_mb(bundle: Path, file: Path) -> float:
-    with pytest.raises(UsageError, match=r"^--max-mb is 0\.001: .* takes [\d.]+ MB: expected") as e:
+    with pytest.raises(UsageError, match=r"^--max-mb is 0\.001: .* takes [\d.]+ MB, expected") as e:
         write_scene(bundle, file, max_mb=0.001)
     found = re.search(r"takes ([\d.]+) MB", str(e.value))
     assert found
@@ -192,12 +192,12 @@ def test_options_of_other_formats_are_refused(
     bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = bundle.parent
-    for words, told in (
+    for words, expected in (
         (["--lod", "1"], "--lod can't be for .html, expected one of .glb"),
         (["--stage", str(out / "stage" / "stage.usda")], "--stage can't be for .html, which holds"),
     ):
         assert main(["export", str(out), str(tmp_path / "s.html"), *words]) == 2
-        assert told in capsys.readouterr().err
+        assert expected in capsys.readouterr().err
     assert main(["export", str(out), str(tmp_path / "s.glb"), "--max-mb", "3"]) == 2
     assert "--max-mb can't be for .glb, expected one of .html" in capsys.readouterr().err
 

@@ -145,8 +145,8 @@ def test_empty_region_is_refused_with_the_extent_of_the_content(
         options = ExportOptions(
             region=parse_region(":,:,7.2:7.4" if kind == "voxel" else ":,:,7.9:")
         )
-        told = rf"--region: no {kind} is in it, expected a part of -0.25:19.75,-9.75:0.25,"
-        with pytest.raises(UsageError, match=told):
+        expected = rf"--region: no {kind} is in it, expected a part of -0.25:19.75,-9.75:0.25,"
+        with pytest.raises(UsageError, match=expected):
             export_stage(sphere_stage, tmp_path / name, options=options)
 
 
@@ -165,9 +165,9 @@ def test_voxels_of_an_oblique_scan_are_at_the_place_in_the_patient(
     for name in ("b.nrrd", "b.nii.gz"):
         capsys.readouterr()
         assert main(["export", str(out), str(tmp_path / name)]) == 0
-        told = capsys.readouterr()
-        assert told.out.startswith(f"wrote {tmp_path / name}: ")
-        assert "export: 1/1 r0_c0" in told.err
+        printed = capsys.readouterr()
+        assert printed.out.startswith(f"wrote {tmp_path / name}: ")
+        assert "export: 1/1 r0_c0" in printed.err
         values, image = read(tmp_path / name)
         k, j, i = np.indices(values.shape)
         index = np.stack([i, j, k], axis=-1).reshape(-1, 3)

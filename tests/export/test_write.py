@@ -97,11 +97,11 @@ def test_parts_of_a_build_and_edits_are_not_overwritten(
     assert main(["export", str(out), str(edit), "--stage", str(edit)]) == 2
     assert edit.read_text("utf-8").startswith("#usda 1.0\n(subLayers")
     assert main(["export", str(out), str(out / "s.glb"), "--json"]) == 0
-    told = capsys.readouterr()
-    lines = json.loads(told.out)["lines"]
+    printed = capsys.readouterr()
+    lines = json.loads(printed.out)["lines"]
     assert len(lines) == 1
     assert lines[0].startswith("2 meshes, ")
-    assert "export: 2/2 r0_c1" in told.err
+    assert "export: 2/2 r0_c1" in printed.err
 
 
 def test_options_of_all_endings_are_flags_of_the_command() -> None:
@@ -125,9 +125,9 @@ def test_help_of_a_flag_names_all_endings_that_take_it() -> None:
 
 def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(tmp_path), str(tmp_path / "s.glb"), "--json"]) == 1
-    told = capsys.readouterr()
-    assert "stereocell:" in told.err
-    assert json.loads(told.out)["exit_code"] == 1
+    printed = capsys.readouterr()
+    assert "stereocell:" in printed.err
+    assert json.loads(printed.out)["exit_code"] == 1
     assert not (tmp_path / "s.glb").exists()
 
 
@@ -152,6 +152,6 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
         assert file.stat().st_size <= 8192
         return
     assert answer.returncode == 1, answer.stderr
-    said = answer.stderr.splitlines()[-1]
-    assert said.startswith(f"stereocell: {file}: "), said
+    printed = answer.stderr.splitlines()[-1]
+    assert printed.startswith(f"stereocell: {file}: "), printed
     assert {one.name for one in small_disk.iterdir()} == {"full"}

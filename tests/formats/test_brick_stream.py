@@ -214,7 +214,7 @@ def test_messages_from_the_documentation_are_accepted(message):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         ("", "not JSON"),
         ("[" * 60000, "not JSON"),
@@ -234,8 +234,8 @@ def test_messages_from_the_documentation_are_accepted(message):
         (json.dumps({**VIEW, "budget": -1}), "minimum"),
     ],
 )
-def test_other_messages_are_refused_in_one_line(text, said):
-    with pytest.raises(BrickFormatError, match=said) as error:
+def test_other_messages_are_refused_in_one_line(text, expected):
+    with pytest.raises(BrickFormatError, match=expected) as error:
         parse_message(text)
     assert len(str(error.value)) < 200
     assert "\n" not in str(error.value)

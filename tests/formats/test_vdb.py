@@ -161,9 +161,9 @@ def test_the_error_for_measured_voxels_of_a_damaged_file_is_one_line(tmp_path: P
     rng = np.random.default_rng(0)
     refused = 0
     for place in rng.integers(start, len(whole), 300).tolist():
-        spoilt = bytearray(whole)
-        spoilt[place] ^= 1 << int(rng.integers(8))
-        path.write_bytes(spoilt)
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
         try:  # either a value differs or the file is refused
             found = VdbValues(path, "measured").box(low, size)
         except StageError:

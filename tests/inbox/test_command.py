@@ -13,7 +13,7 @@ from stereocell.cli.__main__ import main
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "expected"),
     [
         (
             [],
@@ -36,10 +36,10 @@ from stereocell.cli.__main__ import main
     ],
 )
 def test_flags_that_make_no_sense_are_refused(
-    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    words: list[str], expected: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["serve", *words]) == 2
-    assert told in capsys.readouterr().err
+    assert expected in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -51,15 +51,15 @@ def test_an_inbox_is_served_until_sigterm_by_one_command_at_a_time(tmp_path: Pat
     ) as server:
         assert server.stdout is not None
         try:
-            told = json.loads(server.stdout.readline())
-            assert told["inbox"] == str(tmp_path / "box")
+            printed = json.loads(server.stdout.readline())
+            assert printed["inbox"] == str(tmp_path / "box")
             second = subprocess.run(
                 command, cwd=tmp_path, capture_output=True, text=True, check=False
             )
         finally:
             server.send_signal(signal.SIGTERM)
-            told_last = server.communicate(timeout=60)
-    assert (server.returncode, told_last) == (0, ("", ""))
+            printed = server.communicate(timeout=60)
+    assert (server.returncode, printed) == (0, ("", ""))
     assert second.returncode == 1
     assert "`stereocell serve` (process" in second.stderr
     assert os.listdir(tmp_path / "box") == ["inbox.json"]

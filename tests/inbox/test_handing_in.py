@@ -217,9 +217,9 @@ def test_a_patients_scan_is_built_and_only_the_upload_held_their_name(
 ) -> None:
     files = dicom(tmp_path)
     with serving_inbox(tmp_path, make_inbox_build, is_near=False) as server:
-        client, told = InboxClient(server.port), []
+        client, answers = InboxClient(server.port), []
         item = client.hand_in(files)
-        told.append(understood(client, item))
+        answers.append(understood(client, item))
         upload = tmp_path / "box" / item / "upload"
         assert any(PATIENT.encode() in path.read_bytes() for path in upload.rglob("*.*"))
         page = client.command(item, "look")["page"]
@@ -233,8 +233,8 @@ def test_a_patients_scan_is_built_and_only_the_upload_held_their_name(
         assert status == 200
         assert manifest["channels"][0]["tileset"] is not None
         assert headers["Stereocell-Bricks"] == "version=1"
-        told += [manifest, client.state()]
-    assert find(tmp_path / "box", [PATIENT, "4711"], {"answers": json.dumps(told)}) == []
+        answers += [manifest, client.state()]
+    assert find(tmp_path / "box", [PATIENT, "4711"], {"answers": json.dumps(answers)}) == []
     assert capfd.readouterr() == ("", "")
     assert caplog.text == ""
 

@@ -207,7 +207,7 @@ def test_an_upload_that_is_damaged_after_the_look_is_an_error_without_its_name(
         _, bricks, volume = look(client, item)
         next((tmp_path / "box" / item / "upload").rglob("*.nii")).write_bytes(head[:-1000])
         found = sent(server.port, bricks, [volume])
-        (error,) = (one for one in found.said if one["type"] == "error")
+        (error,) = (one for one in found.messages if one["type"] == "error")
         assert error["code"] == "damaged"
         assert "Doe" not in str(error)
         client.ask("DELETE", f"/items/{item}")

@@ -76,8 +76,8 @@ def test_a_restart_goes_on_with_uploads_the_queue_and_the_build(
         third = client.announce([("third.nii", head)])
         client.send(third, head[:100], 0)
         client.wait(first, "building")
-        told = client.item(third)
-    assert (told["bytes"], told["total"]) == (100, len(head))
+        state = client.item(third)
+    assert (state["bytes"], state["total"]) == (100, len(head))
     with serving_inbox(tmp_path, FakeBuilds()) as server:
         client = InboxClient(server.port)
         assert client.announce([("third.nii", head)]) == third

@@ -8,8 +8,8 @@ from scipy import ndimage
 
 from corpus import all_cases
 from corpus.case import Case
+from corpus.level_search import LevelSearch, search_levels
 from corpus.made import CAMERAS, FAULTS, empty_cases, made_cases, nested_cases
-from corpus.sight import Sight, look_at
 from stereocell.isosurface.channel_level import find_levels
 from stereocell.isosurface.level_evidence import Counting, find_padding
 from support.exhaustive import sweep
@@ -28,15 +28,15 @@ EASY = {
 }
 
 
-def dice(sight: Sight, level: int = 0) -> float:
-    inside = sight.values > sight.found.clear[level].value
-    return float(2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()))
+def dice(search: LevelSearch, level: int = 0) -> float:
+    inside = search.values > search.found.clear[level].value
+    return float(2 * (inside & search.truth).sum() / (inside.sum() + search.truth.sum()))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sweep(EASY, kept=[name for name in EASY if name != "dim tissue"]))
 def test_the_first_level_finds_the_bodies(name: str) -> None:
-    assert dice(look_at(MADE[name])) > EASY[name]
+    assert dice(search_levels(MADE[name])) > EASY[name]
 
 
 @pytest.mark.slow
@@ -55,12 +55,12 @@ def test_the_first_level_finds_the_bodies(name: str) -> None:
     ),
 )
 def test_an_empty_volume_has_no_clear_level(name: str) -> None:
-    assert look_at(EMPTY[name]).found.clear == ()
+    assert search_levels(EMPTY[name]).found.clear == ()
 
 
 @pytest.mark.slow
 def test_the_reason_for_no_surface_names_uneven_light() -> None:
-    found = look_at(EMPTY["empty, emccd, depth x 10"]).found
+    found = search_levels(EMPTY["empty, emccd, depth x 10"]).found
     assert found.light > 0.95
     assert "lies along the axes alone and in no valley, as with uneven light" in found.why_unclear
 
@@ -68,13 +68,13 @@ def test_the_reason_for_no_surface_names_uneven_light() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["slab", "bodies in depth", "edge at 5 degrees"])
 def test_bodies_are_found_in_uneven_light_and_so_are_sections_and_edges(name: str) -> None:
-    assert dice(look_at(MADE[name])) > 0.85
+    assert dice(search_levels(MADE[name])) > 0.85
 
 
 @pytest.mark.slow
 def test_levels_do_not_depend_on_the_cut_into_tiles() -> None:
     case = MADE["tissue"]
-    cuts = [look_at(replace(case, grid=grid)).found for grid in ((1, 1), (3, 2), (1, 5))]
+    cuts = [search_levels(replace(case, grid=grid)).found for grid in ((1, 1), (3, 2), (1, 5))]
     whole = [level.value for level in cuts[0].all_levels]
     assert len(whole) >= 3
     for found in cuts[1:]:
@@ -86,9 +86,9 @@ def test_levels_do_not_depend_on_the_cut_into_tiles() -> None:
 
 @pytest.mark.slow
 def test_a_tile_with_voxels_on_one_side_alone_has_no_level() -> None:
-    sight = look_at(replace(MADE["tissue"], grid=(1, 8)))
-    level = sight.found.clear[0]
-    judged = [sight.found.judge_tile(level, evidence) for _, evidence in sight.tiles]
+    search = search_levels(replace(MADE["tissue"], grid=(1, 8)))
+    level = search.found.clear[0]
+    judged = [search.found.judge_tile(level, evidence) for _, evidence in search.tiles]
     assert judged[0] is None
     assert judged[-1] is None
     at_rim = [found for found in judged if found is not None]
@@ -104,11 +104,11 @@ def test_no_background_is_subtracted_from_ct_and_bone_lies_within_skin() -> None
     hu = ndimage.gaussian_filter(hu, (0.4, 0.8, 0.8))
     voxels = (hu + rng.normal(0, 12, hu.shape)).round().astype(np.int16)
     case = Case("ct", "made", (1000.0, 500.0, 500.0), lambda: (voxels, away < 38), kind="CT")
-    sight = look_at(case)
-    assert not sight.found.subtracts
-    outer, inner = sight.found.clear[:2]
+    search = search_levels(case)
+    assert not search.found.subtracts
+    outer, inner = search.found.clear[:2]
     assert -900 < outer.value < 0 < 200 < inner.value < 850
-    assert dice(sight) > 0.96
+    assert dice(search) > 0.96
 
 
 @pytest.mark.parametrize("ghost", [0.0, 12.0])
@@ -127,17 +127,17 @@ def test_the_outer_level_of_mr_keeps_skin_that_is_dimmer_than_the_brain(ghost: f
     noise = rng.normal(0, 1 if ghost else 2, (2, *signal.shape))
     voxels = np.hypot(signal + noise[0], noise[1])
     case = Case("flair", "made", (3000.0, 1000.0, 1000.0), lambda: (voxels, away < 44), kind="MR")
-    sight = look_at(case)
-    inside = ndimage.binary_fill_holes(sight.values > sight.found.clear[0].value)
-    assert 2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()) > 0.95
+    search = search_levels(case)
+    inside = ndimage.binary_fill_holes(search.values > search.found.clear[0].value)
+    assert 2 * (inside & search.truth).sum() / (inside.sum() + search.truth.sum()) > 0.95
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["nested, 40 photons, x 1.5", "nested, 160 photons, x 5"])
 def test_nuclei_in_cells_have_a_level_of_their_own(name: str) -> None:
-    sight = look_at(NESTED[name])
-    assert len(sight.found.clear) == 2
-    assert dice(sight, 1) > 0.9
+    search = search_levels(NESTED[name])
+    assert len(search.found.clear) == 2
+    assert dice(search, 1) > 0.9
 
 
 def test_equal_bodies_have_no_second_level() -> None:
@@ -146,16 +146,16 @@ def test_equal_bodies_have_no_second_level() -> None:
     z, y, x = np.ogrid[:48, :96, :96]
     ball = (z - 24) ** 2 + (y - 48) ** 2 + (x - 40) ** 2 < 18**2
     voxels = rng.poisson(10 + 90 * ball).astype(np.uint16)
-    sight = look_at(Case("ball", "made", (1.0, 1.0, 1.0), lambda: (voxels, ball)))
-    assert len(sight.found.all_levels) == 1
-    assert dice(sight) > 0.97
+    search = search_levels(Case("ball", "made", (1.0, 1.0, 1.0), lambda: (voxels, ball)))
+    assert len(search.found.all_levels) == 1
+    assert dice(search) > 0.97
 
 
 def test_equal_voxels_have_no_level() -> None:
     case = Case(
         "flat", "empty", (1.0, 1.0, 1.0), lambda: (np.full((8, 32, 32), 9, np.uint16), None)
     )
-    assert look_at(case).found.clear == ()
+    assert search_levels(case).found.clear == ()
 
 
 def test_padding_is_runs_of_the_darkest_value_and_not_dark_noise() -> None:
@@ -188,10 +188,10 @@ def test_held_out_cases_include_empty_volumes_and_all_names_differ() -> None:
 
 @pytest.mark.slow
 def test_tiles_without_voxels_have_no_level() -> None:
-    sight = look_at(EMPTY["empty, scmos, plain"])
+    search = search_levels(EMPTY["empty, scmos, plain"])
     bare = [replace(tile, plain=_none(tile.plain), padding=_none(tile.padding), above=None)
-            for _, tile in sight.tiles]  # fmt: skip
-    found = find_levels(bare, counting=Counting(sight.scale, None, 0.0), finest_um=1.0)
+            for _, tile in search.tiles]  # fmt: skip
+    found = find_levels(bare, counting=Counting(search.scale, None, 0.0), finest_um=1.0)
     assert found.all_levels == ()
     assert found.clear == ()
 

@@ -5,8 +5,8 @@ from math import inf
 
 import pytest
 
+from corpus.level_search import search_levels
 from corpus.real import real_cases
-from corpus.sight import look_at
 from stereocell.isosurface.level import bodies_in_haze, shown_of
 from support.levels import CLEAR
 
@@ -51,11 +51,11 @@ TRUNK = next((case for case in real_cases() if case.name == "mr trunk"), None)
 def test_a_coarse_mr_of_a_trunk_keeps_its_skin() -> None:
     """Air and tissue differ by 2.5 times the noise. The next level would keep only fat."""
     assert TRUNK is not None
-    sight = look_at(TRUNK)
-    outer = sight.found.shown()[0]
-    assert outer not in sight.found.clear
-    inside = sight.values > outer.value
-    assert 2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()) > 0.95
+    search = search_levels(TRUNK)
+    outer = search.found.shown()[0]
+    assert outer not in search.found.clear
+    inside = search.values > outer.value
+    assert 2 * (inside & search.truth).sum() / (inside.sum() + search.truth.sum()) > 0.95
 
 
 @pytest.mark.parametrize(

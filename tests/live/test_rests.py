@@ -92,14 +92,14 @@ def test_a_process_that_has_ended_is_let_alone(busy: psutil.Process) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_a_build_at_rest_ends_with_a_server_that_is_killed(tmp_path: Path) -> None:
-    told = tmp_path / "build"
+    id_file = tmp_path / "build"
     with subprocess.Popen(
         [sys.executable, "-m", "support.server_of_a_build", str(tmp_path)],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         start_new_session=True,
     ) as server:
-        until(told.exists)
-        build = psutil.Process(int(told.read_text()))
+        until(id_file.exists)
+        build = psutil.Process(int(id_file.read_text()))
         until(lambda: build.status() == psutil.STATUS_STOPPED)
         server.send_signal(signal.SIGKILL)
     until(lambda: not build.is_running() or build.status() == psutil.STATUS_ZOMBIE)

@@ -52,9 +52,9 @@ def test_a_source_is_served_until_ctrl_c_and_its_folder_is_removed(tmp_path: Pat
             assert len(list(scratch.iterdir())) == 1
         finally:
             server.send_signal(signal.SIGINT)
-            _, told = server.communicate(timeout=60)
+            _, printed = server.communicate(timeout=60)
     assert server.returncode == 0
-    assert "first view of f after" in told
+    assert "first view of f after" in printed
     assert list(scratch.iterdir()) == []
     assert sorted(tmp_path.iterdir()) == [source, scratch]
 
@@ -91,8 +91,8 @@ def test_a_stopped_build_goes_on_behind_the_page_and_a_finished_one_is_shown(
                 assert "Stereocell-Live" not in answer.headers
         finally:
             server.send_signal(signal.SIGTERM)
-            _, told = server.communicate(timeout=60)
-    assert "showing the finished build in out" in told
+            _, printed = server.communicate(timeout=60)
+    assert "showing the finished build in out" in printed
     assert main(["build", str(source), "-o", str(tmp_path / "plain"), *command[-2:]]) == 0
     # in this process the viewer is a small one, so that the page differs
     for part in ("stage", "bundle/channels", "bundle/volumes", "bundle/luts"):
@@ -113,10 +113,10 @@ def test_ctrl_c_while_the_build_starts_prints_no_traceback(tmp_path: Path) -> No
         while expected and (line := server.stdout.readline()):
             expected = {words for words in expected if words not in line}
         os.killpg(server.pid, signal.SIGINT)  # as a terminal does
-        told = server.stdout.read()
+        printed = server.stdout.read()
     assert server.returncode == 0
-    assert "Traceback" not in told
-    assert "stopped" not in told  # by the user, who knows
+    assert "Traceback" not in printed
+    assert "stopped" not in printed  # by the user, who knows
 
 
 def test_sources_are_distinguished_from_builds_and_bundles(tmp_path: Path) -> None:

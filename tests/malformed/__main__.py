@@ -57,9 +57,10 @@ def run(cases: list[Case], folder: Path, options: argparse.Namespace) -> list[tr
         found.append(outcome)
         if outcome.fault or options.show:
             about = f"{outcome.case.kind}: {outcome.case.name}: exit code {outcome.code}"
-            told = f"FAULT {outcome.fault}" if outcome.fault else outcome.line
+            result = f"FAULT {outcome.fault}" if outcome.fault else outcome.line
             print(
-                f"{about}, {outcome.seconds:.1f} s, {outcome.peak_mb:.0f} MB: {told!a}", flush=True
+                f"{about}, {outcome.seconds:.1f} s, {outcome.peak_mb:.0f} MB: {result!a}",
+                flush=True,
             )
     return found
 

@@ -18,16 +18,16 @@ FILES = ("f.h5", "f.ims", "f.nrrd", "f.mha", "f.mrc", "f.czi", "f.lif")
 
 def cases() -> Iterator[Case]:
     for name in FILES:
-        yield _spoilt(f"{name} is empty", lambda p: p.write_bytes(b""), name, "refused")
-        yield _spoilt(f"{name} is a folder", _to_folder, name, "refused")
-        yield _spoilt(f"{name} is a pipe", _to_pipe, name, "refused")
-        yield _spoilt(f"{name} is without end", _to_zeros, name, "refused")
+        yield _damaged(f"{name} is empty", lambda p: p.write_bytes(b""), name, "refused")
+        yield _damaged(f"{name} is a folder", _to_folder, name, "refused")
+        yield _damaged(f"{name} is a pipe", _to_pipe, name, "refused")
+        yield _damaged(f"{name} is without end", _to_zeros, name, "refused")
     yield from _headers()
     yield from _hdf5()
     yield from _n5()
 
 
-def _spoilt(
+def _damaged(
     name: str,
     spoil: Callable[[Path], Any],
     file: str,
@@ -98,7 +98,7 @@ def _headers() -> Iterator[Case]:
     for file, changes in rows.items():
         for old, new in changes:
             name = f"{file} with {new[:50]!a}"
-            yield _spoilt(name, partial(_replace, old=old, new=new), file)
+            yield _damaged(name, partial(_replace, old=old, new=new), file)
 
 
 def _hdf5() -> Iterator[Case]:
@@ -107,7 +107,7 @@ def _hdf5() -> Iterator[Case]:
             with h5py.File(path, "a") as file:
                 change(file)
 
-        return _spoilt(f"HDF5: {name}", spoil, "f.h5", expect)
+        return _damaged(f"HDF5: {name}", spoil, "f.h5", expect)
 
     def dataset(file: h5py.File, **options: Any) -> None:
         del file["raw"]
@@ -150,11 +150,11 @@ def _n5() -> Iterator[Case]:
         def spoil(path: Path, place: Any = place, value: Any = value) -> None:
             edit_json(path / "attributes.json", put(*place, value))
 
-        yield _spoilt(f"N5: {'.'.join(place)} {json.dumps(value):.40}", spoil, "f.n5")
-    yield _spoilt(
+        yield _damaged(f"N5: {'.'.join(place)} {json.dumps(value):.40}", spoil, "f.n5")
+    yield _damaged(
         "N5: a block is a pipe", lambda p: _to_pipe(p / "0" / "0" / "0"), "f.n5", "refused"
     )
-    yield _spoilt(
+    yield _damaged(
         "N5: a block of another size",
         lambda p: (p / "0" / "0" / "0").write_bytes(np.array([0, 3, 0, 9], ">u2").tobytes()),
         "f.n5",

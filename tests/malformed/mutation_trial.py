@@ -147,9 +147,9 @@ def _in_fork(source: Path, answer: Path) -> dict[str, Any]:
     if status:
         return {"fault": f"ended by signal {status & 127}"}
     found: dict[str, Any] = json.loads(answer.read_text("utf-8"))
-    said = noise.read_text(errors="replace")
-    if said and "fault" not in found:
-        return {"fault": f"noise: {said[:300]}"}
+    printed = noise.read_text(errors="replace")
+    if printed and "fault" not in found:
+        return {"fault": f"noise: {printed[:300]}"}
     if used.ru_maxrss / 1000 > PEAK_MB:
         return {"fault": f"memory: {used.ru_maxrss / 1000:.0f} MB"}
     return found

@@ -27,13 +27,13 @@ _NAN, _INF = float("nan"), float("inf")
 
 def cases() -> Iterator[Case]:
     for name in ("f.nii", "f.nii.gz"):
-        yield _spoilt(f"{name} is empty", lambda p: p.write_bytes(b""), name, "refused")
+        yield _damaged(f"{name} is empty", lambda p: p.write_bytes(b""), name, "refused")
     yield from _fields()
     yield from _voxels()
     yield from _streams()
 
 
-def _spoilt(
+def _damaged(
     name: str, spoil: Callable[[Path], Any], file: str = "f.nii", expect: str = "any"
 ) -> Case:
     def make(base: Path, folder: Path) -> list[str]:
@@ -62,50 +62,50 @@ def _fields() -> Iterator[Case]:
         "32767 times": (4, 36, 48, 16, 32767, 1, 1, 1), "five": (5, 36, 48, 4, 1, 4, 1, 1),
     }  # fmt: skip
     for name, value in dims.items():
-        yield _spoilt(
+        yield _damaged(
             f"dim {name}",
             lambda p, v=value: _set(p, dim=v),
             expect="refused" if name != "32767 times" else "any",
         )
     for value in (0, 1, 3, 32, 128, 1536, 1792, 2304, 9999, -4, 1280):
-        yield _spoilt(f"datatype {value}", lambda p, v=value: _set(p, datatype=v))
-    yield _spoilt("bitpix of another type", lambda p: _set(p, bitpix=64))
+        yield _damaged(f"datatype {value}", lambda p, v=value: _set(p, datatype=v))
+    yield _damaged("bitpix of another type", lambda p: _set(p, bitpix=64))
     for value in (0.0, 10.0, -352.0, 1e30, _NAN, _INF, 352.5, 1e9):
-        yield _spoilt(f"vox_offset {value}", lambda p, v=value: _set(p, vox_offset=v))
+        yield _damaged(f"vox_offset {value}", lambda p, v=value: _set(p, vox_offset=v))
     for value in (0.0, _NAN, _INF, 1e38, 1e-45, -1.0):
-        yield _spoilt(f"scl_slope {value}", lambda p, v=value: _set(p, scl_slope=v))
-        yield _spoilt(f"scl_inter {value}", lambda p, v=value: _set(p, scl_slope=1.0, scl_inter=v))
+        yield _damaged(f"scl_slope {value}", lambda p, v=value: _set(p, scl_slope=v))
+        yield _damaged(f"scl_inter {value}", lambda p, v=value: _set(p, scl_slope=1.0, scl_inter=v))
     for value in (0.0, _NAN, _INF, -1.0, 1e38, 1e-38):
         pixdim = (1.0, value, 1.0, 1.0, 0, 0, 0, 0)
-        yield _spoilt(
+        yield _damaged(
             f"pixdim {value} by qform",
             lambda p, v=pixdim: _set(p, pixdim=v, sform_code=0, qform_code=1),
         )
-        yield _spoilt(
+        yield _damaged(
             f"pixdim {value} alone",
             lambda p, v=pixdim: _set(p, pixdim=v, sform_code=0, qform_code=0),
         )
         row = (value, 0.0, 0.0, value)
-        yield _spoilt(f"srow {value}", lambda p, v=row: _set(p, srow_x=v, sform_code=1))
-    yield _spoilt(
+        yield _damaged(f"srow {value}", lambda p, v=row: _set(p, srow_x=v, sform_code=1))
+    yield _damaged(
         "sform singular", lambda p: _set(p, srow_x=(0, 0, 1, 0), srow_z=(0, 0, 1, 0), sform_code=1)
     )
-    yield _spoilt(
+    yield _damaged(
         "sform all but singular",
         lambda p: _set(p, srow_x=(1, 1, 0, 0), srow_z=(1, 1.001, 1, 0), sform_code=1),
     )
-    yield _spoilt(
+    yield _damaged(
         "quaternion beyond 1", lambda p: _set(p, quatern_b=5.0, sform_code=0, qform_code=1)
     )
-    yield _spoilt("quaternion NaN", lambda p: _set(p, quatern_b=_NAN, sform_code=0, qform_code=1))
-    yield _spoilt("unknown unit", lambda p: _set(p, xyzt_units=255))
-    yield _spoilt("codes absurd", lambda p: _set(p, sform_code=-7, qform_code=999))
+    yield _damaged("quaternion NaN", lambda p: _set(p, quatern_b=_NAN, sform_code=0, qform_code=1))
+    yield _damaged("unknown unit", lambda p: _set(p, xyzt_units=255))
+    yield _damaged("codes absurd", lambda p: _set(p, sform_code=-7, qform_code=999))
     for value in (b"abcd", b"ni1\0", b"n+9\0", b"\0" * 4):
-        yield _spoilt(f"magic {value!r}", lambda p, v=value: _set(p, magic=v))
-    yield _spoilt("header of another length", lambda p: _set(p, sizeof_hdr=540))
-    yield _spoilt("extension of 2^31 bytes", lambda p: _extend(p, 0x7FFFFFF0))
-    yield _spoilt("extension of -1 bytes", lambda p: _extend(p, -1))
-    yield _spoilt("extension of 0 bytes", lambda p: _extend(p, 0))
+        yield _damaged(f"magic {value!r}", lambda p, v=value: _set(p, magic=v))
+    yield _damaged("header of another length", lambda p: _set(p, sizeof_hdr=540))
+    yield _damaged("extension of 2^31 bytes", lambda p: _extend(p, 0x7FFFFFF0))
+    yield _damaged("extension of -1 bytes", lambda p: _extend(p, -1))
+    yield _damaged("extension of 0 bytes", lambda p: _extend(p, 0))
 
     def second(base: Path, folder: Path) -> list[str]:
         head = nibabel.Nifti2Header()
@@ -184,12 +184,12 @@ def _streams() -> Iterator[Case]:
     yield packed("offset 4 GB on", lambda c: gzip.compress(_with_offset(c)) + zeros * 256, "any")
     yield packed("damaged sum", lambda c: gzip.compress(c)[:-8] + bytes(8), "any")
     yield packed("zlib, not gzip", lambda c: zlib.compress(c), "refused")
-    yield _spoilt("is a pipe", lambda p: (p.unlink(), os.mkfifo(p)), expect="refused")
-    yield _spoilt("is a folder", lambda p: (p.unlink(), p.mkdir()), expect="refused")
-    yield _spoilt(
+    yield _damaged("is a pipe", lambda p: (p.unlink(), os.mkfifo(p)), expect="refused")
+    yield _damaged("is a folder", lambda p: (p.unlink(), p.mkdir()), expect="refused")
+    yield _damaged(
         "is without end", lambda p: (p.unlink(), os.symlink("/dev/zero", p)), expect="refused"
     )
-    yield _spoilt(
+    yield _damaged(
         "is a link to itself", lambda p: (p.unlink(), os.symlink(p.name, p)), expect="refused"
     )
 

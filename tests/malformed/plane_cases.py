@@ -21,7 +21,7 @@ _VOXELS = np.random.default_rng(0).integers(0, 999, (6, 16, 18)).astype(np.uint1
 
 def cases() -> Iterator[Case]:
     yield from _described()
-    yield from _spoilt()
+    yield from _damaged()
     yield from _folders()
 
 
@@ -60,7 +60,7 @@ def _described() -> Iterator[Case]:
         yield Case(f"described as {name}", KIND, make, expect)
 
 
-def _spoilt() -> Iterator[Case]:
+def _damaged() -> Iterator[Case]:
     writers: dict[str, Callable[[Path], Any]] = {
         "lsm": lambda path: write_lsm(path, _VOXELS[:, None], (2, 1, 1), {"A": (255, 0, 0)}),
         "stk": lambda path: write_stk(path, _VOXELS, (2, 1, 1)),

@@ -23,8 +23,8 @@ Tags = dict[int, tuple[str, Any]]
 
 def cases() -> Iterator[Case]:
     for name in ("f.ome.tif", "t.ome.tif"):
-        yield _spoilt(f"{name} is empty", name, lambda p: p.write_bytes(b""))
-    yield _spoilt("head of zeros", "f.ome.tif", lambda p: p.write_bytes(bytes(5000)))
+        yield _damaged(f"{name} is empty", name, lambda p: p.write_bytes(b""))
+    yield _damaged("head of zeros", "f.ome.tif", lambda p: p.write_bytes(bytes(5000)))
     yield from _tags()
     yield from _directories()
     yield from _texts()
@@ -32,7 +32,7 @@ def cases() -> Iterator[Case]:
     yield from _names()
 
 
-def _spoilt(name: str, file: str, spoil: Callable[[Path], Any]) -> Case:
+def _damaged(name: str, file: str, spoil: Callable[[Path], Any]) -> Case:
     def make(base: Path, folder: Path) -> list[str]:
         path = copied(base, folder, file)
         spoil(path)
@@ -177,8 +177,8 @@ def _tags() -> Iterator[Case]:
     runs = b"".join(struct.pack("<I", (1 << 17) << 3 | 2)[:3] + b"\0" for _ in range(_HUGE >> 17))
     zstd = b"\x28\xb5\x2f\xfd"
     yield _made("zstd bomb", strip=zstd + b"\0\x38" + runs + b"\x01\0\0", tags={259: ("H", 50000)})
-    said = zstd + b"\xe0" + struct.pack("<Q", 1 << 60) + b"\x01\0\0"
-    yield _made("zstd claims 2^60", strip=said, tags={259: ("H", 50000)})
+    frame = zstd + b"\xe0" + struct.pack("<Q", 1 << 60) + b"\x01\0\0"
+    yield _made("zstd claims 2^60", strip=frame, tags={259: ("H", 50000)})
 
 
 def _directories() -> Iterator[Case]:

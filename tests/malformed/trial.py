@@ -224,7 +224,7 @@ def _usual_warnings() -> None:
 
 def _find_fault(case: Case, arguments: list[str], code: int, stdout: str, stderr: str) -> str:
     if "bait" in stdout + stderr and "the secret of the bait" in stdout + stderr:
-        return "told what lies outside"
+        return "shows a file outside of the source"
     if case.expect == "refused" and code == 0:
         return "done, expected a refusal"
     if case.expect == "done" and code:

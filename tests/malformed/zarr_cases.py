@@ -33,7 +33,7 @@ def _json(name: str, file: str, change: Change, expect: str = "any", version: in
 
 
 def cases() -> Iterator[Case]:
-    yield from _spoilt_text()
+    yield from _damaged_text()
     yield from _arrays()
     yield from _images()
     yield from _collections()
@@ -42,7 +42,7 @@ def cases() -> Iterator[Case]:
     yield from _chunks()
 
 
-def _spoilt_text() -> Iterator[Case]:
+def _damaged_text() -> Iterator[Case]:
     files = {5: ("zarr.json", "0/zarr.json"), 4: (".zattrs", ".zgroup", "0/.zarray")}
     for version, names in files.items():
         for file in names:

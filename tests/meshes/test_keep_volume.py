@@ -135,17 +135,17 @@ def test_unchanged_bodies_keep_their_moves_and_are_not_checked_again(
     after = simplifier.simplify(ERROR / 4, chosen)
     is_far = after.mesh.positions[:, 0] > 30
     np.testing.assert_array_equal(after.changed, is_far)
-    looked_at = []
+    counts = []
 
     def count_fresh(*given: Any, fresh: Any, **named: Any) -> Defects:
-        looked_at.append(fresh.sum())
+        counts.append(fresh.sum())
         return find_defects(*given, fresh=fresh, **named)
 
     monkeypatch.setattr(keep_volume, "find_defects", count_fresh)
     earlier = EarlierLevel(first, before.vertices, after.changed)
     second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
-    assert looked_at[0] == is_far[after.mesh.triangles[:, 0]].sum()
-    assert len(looked_at) == 1
+    assert counts[0] == is_far[after.mesh.triangles[:, 0]].sum()
+    assert len(counts) == 1
     was_far = before.mesh.positions[:, 0] > 30
     np.testing.assert_array_equal(second.mesh.positions[~is_far], first.mesh.positions[~was_far])
     assert second.defects.total == 0

@@ -79,7 +79,7 @@ def test_no_triangle_comes_to_lie_in_a_second_plane_where_two_planes_meet(seed: 
     noise = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=SHAPE), 0.8)
     field = np.clip(noise / noise.std() * 0.4, -0.56, 0.56).astype(np.float32)
     for mesh, lattice in _tiles(field, 0.1):
-        assert not len(find_defects(mesh, planes=lattice.cut_planes()).walls)
+        assert not len(find_defects(mesh, planes=lattice.cut_planes()).in_cut_plane)
 
 
 @pytest.mark.slow

@@ -111,7 +111,7 @@ def _common_points(one: list[Point], other: list[Point]) -> set[Point]:
 def test_random_triangles_on_a_coarse_grid_meet_as_in_rational_arithmetic(shared: int) -> None:
     """On 4 x 4 x 3 points most pairs of triangles are special: coplanar, collinear, touching."""
     rng = np.random.default_rng(shared)
-    met = 0
+    meeting = 0
     for _ in range(200):
         positions = rng.integers(0, [4, 4, 3], (6 - shared, 3)).astype(float)
         triangles = np.array([[0, 1, 2], [0, 1, 2]])
@@ -124,8 +124,8 @@ def test_random_triangles_on_a_coarse_grid_meet_as_in_rational_arithmetic(shared
         beside = common - {one[k] for k in range(shared)}
         found = find_crossings(positions, triangles)
         assert len(found) == bool(beside), (positions, beside)
-        met += bool(beside)
-    assert 10 < met < 190
+        meeting += bool(beside)
+    assert 10 < meeting < 190
 
 
 def test_signs_are_exact_although_floats_round() -> None:
@@ -238,7 +238,7 @@ def test_few_fresh_triangles_among_many_are_found_in_all_their_pairs() -> None:
 def test_triangles_around_a_vertex_give_the_same_pairs_together_and_two_by_two(kind: str) -> None:
     """Together most pairs are skipped; the result must be that of testing each pair alone."""
     rng = np.random.default_rng(len(kind))
-    met, spread = 0, 0
+    meeting, spread = 0, 0
     tries = examples(150, 30)
     for _ in range(tries):
         count = int(rng.integers(3, 9))
@@ -264,9 +264,9 @@ def test_triangles_around_a_vertex_give_the_same_pairs_together_and_two_by_two(k
             if len(find_crossings(positions, triangles[[i, j]]))
         ]
         assert find_crossings(positions, triangles).tolist() == [list(pair) for pair in alone]
-        met += bool(alone)
+        meeting += bool(alone)
         is_spread = find_spread(positions, triangles.astype(np.int32))
         assert not is_spread[1:].any()  # vertices of the ring have two triangles each
         spread += bool(is_spread[0])
-    assert 150 * met >= tries * {"round twice": 100, "anyhow": 40, "in a plane": 5}.get(kind, 0)
+    assert 150 * meeting >= tries * {"round twice": 100, "anyhow": 40, "in a plane": 5}.get(kind, 0)
     assert 150 * spread >= tries * {"a star": 120, "in a plane": 20}.get(kind, 0)

@@ -78,8 +78,8 @@ def test_a_triangle_in_a_cut_plane_is_found() -> None:
     second = after[first]
     lid = [[after[second], second, first]]
     defects = find_defects(_with(half, np.concatenate([half.triangles, lid])), planes=(plane,))
-    assert kinds(defects) == {"walls"}
-    assert defects.walls.tolist() == [len(half.triangles)]
+    assert kinds(defects) == {"in_cut_plane"}
+    assert defects.in_cut_plane.tolist() == [len(half.triangles)]
 
 
 def test_a_vertex_pushed_through_the_other_side_makes_crossings() -> None:

@@ -42,7 +42,7 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
         "Shows means of 1 x 3 x 3 voxels (z, y, x): the array has 110,592"
     )
     assert viewer.name == "a ball_1"
-    assert "24 x 16 x 16 voxels" in viewer.told
+    assert "24 x 16 x 16 voxels" in viewer.notes
     assert capsys.readouterr() == ("", "")  # a notebook is no log
 
     def drawn(**looks):

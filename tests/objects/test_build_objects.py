@@ -80,7 +80,7 @@ def test_two_tiles_have_the_same_interface_at_the_finest_level(halves) -> None:
     between = [
         {
             (min(pair), max(pair)): area
-            for (place, other), area in zip(one.walls.tolist(), one.wall_um2, strict=True)
+            for (place, other), area in zip(one.interfaces.tolist(), one.interface_um2, strict=True)
             for pair in [(numbers[place], other)]
             if other not in numbers
         }
@@ -107,7 +107,7 @@ def test_objects_touch_where_their_voxels_share_faces(halves) -> None:
         pairs |= set(map(tuple, np.stack([a[kept], b[kept]], 1).tolist()))
     pairs |= {(b, a) for a, b in pairs}
     for numbers, one in zip(owned, built, strict=True):
-        found = {(numbers[place], other) for place, other in one.walls.tolist()}
+        found = {(numbers[place], other) for place, other in one.interfaces.tolist()}
         assert found == {(a, b) for a, b in pairs if a in numbers}
 
 
@@ -117,7 +117,7 @@ def test_a_ball_has_the_area_and_volume_of_a_ball() -> None:
     built = build(ball, [1])
     assert built.areas_um2[0] == pytest.approx(4 * np.pi * 100, rel=0.02)
     assert built.volumes_um3[0] == pytest.approx(4 / 3 * np.pi * 1000, rel=0.01)
-    assert built.walls.shape == (0, 2)
+    assert built.interfaces.shape == (0, 2)
     x_um, y_um, z_um = one_object(built.lods[0].mesh, 0).positions.mean(axis=0)
     assert (z_um, -y_um, x_um) == pytest.approx((119, 115, 115), abs=0.2)
 

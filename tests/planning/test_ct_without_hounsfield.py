@@ -48,9 +48,9 @@ def _write(folder: Path, voxels: NDArray[np.generic]) -> Path:
     return nifti_files.write(folder / "ct.nii.gz", affine, voxels.transpose(2, 1, 0))
 
 
-def _advised_flags(said: str) -> list[str]:
+def _advised_flags(printed: str) -> list[str]:
     """Return the flags that the plan advises for a CT, as a user would copy them."""
-    advice = said.partition("for a CT ")[2]
+    advice = printed.partition("for a CT ")[2]
     words = shlex.split(advice.replace(";", " ").replace(", ", " "))
     last = words.index("--window") + 1
     return words[: last + 1]
@@ -77,9 +77,9 @@ def test_the_flags_that_are_advised_open_with_a_function_at_the_skin(
     assert main(["plan", str(source), "-o", str(tmp_path / "first")]) == 0
     flags = _advised_flags(capsys.readouterr().err.replace("\n", " "))
     look = _built(source, tmp_path / "out", flags)
-    said = capsys.readouterr().err.replace("\n", " ")
-    assert STAYS in said
-    assert "a table or head holder is kept" in said
+    printed = capsys.readouterr().err.replace("\n", " ")
+    assert STAYS in printed
+    assert "a table or head holder is kept" in printed
     notes = json.loads((tmp_path / "out" / "provenance.json").read_text("utf-8"))["notes"]
     assert any(STAYS in note for note in notes)
     assert not set(look.transfer_functions) & set(TISSUES)
@@ -134,10 +134,10 @@ def test_a_crop_without_air_is_in_hounsfield_units_if_the_user_says_so(
     assert f"{STAYS} and a table or head holder is kept (--as hounsfield" in (
         capfd.readouterr().err.replace("\n", " ")
     )
-    said = tmp_path / "said"
-    assert main([*command[:3], str(said), *command[4:], "--as", "hounsfield"]) == 0
+    stated = tmp_path / "stated"
+    assert main([*command[:3], str(stated), *command[4:], "--as", "hounsfield"]) == 0
     assert "not Hounsfield units" not in capfd.readouterr().err
-    plan = json.loads((said / "plan.json").read_text("utf-8"))
+    plan = json.loads((stated / "plan.json").read_text("utf-8"))
     assert (plan["modality"], plan["is_hounsfield"]) == ("CT", True)
 
 

@@ -14,10 +14,10 @@ from stereocell.planning.level_choice import choose_apart
 from stereocell.planning.survey import Survey
 from support import phantoms
 
-Rung = dict[str, dict[str, int]]
+ComponentSums = dict[str, dict[str, int]]
 
 
-def _rung(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> Rung:
+def _sums(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> ComponentSums:
     """Return a level's sums by tile from (voxels, largest, count). All others are specks."""
     names = ("voxels", "largest", "count", "kept")
     return {
@@ -26,31 +26,31 @@ def _rung(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> Rung:
     }
 
 
-TISSUE = _rung((1000, 1000, 1), (900, 890, 4))
-CELLS = _rung((100, 10, 40), (90, 9, 50))
-TOUCHING = _rung((100, 60, 40), (90, 20, 50))  # the largest components hold .42
+TISSUE = _sums((1000, 1000, 1), (900, 890, 4))
+CELLS = _sums((100, 10, 40), (90, 9, 50))
+TOUCHING = _sums((100, 60, 40), (90, 20, 50))  # the largest components hold .42
 # A level that shows the brightest cortex of a whole mouse brain at 25 um
-BRIGHT_PARTS = _rung((249778, 89062, 159), (98724, 94128, 32), kept_share=0.05)
-SPECKS = _rung((4, 2, 2), (5, 2, 3))
+BRIGHT_PARTS = _sums((249778, 89062, 159), (98724, 94128, 32), kept_share=0.05)
+SPECKS = _sums((4, 2, 2), (5, 2, 3))
 
 
 @pytest.mark.parametrize(
-    ("rungs", "chosen"),
+    ("by_level", "chosen"),
     [
         ([TISSUE, CELLS], 1),
         ([TISSUE, TOUCHING, CELLS], 2),
         ([TISSUE, TOUCHING], 1),
         ([TISSUE, SPECKS], 0),  # a few specks are not cells
         ([TISSUE, BRIGHT_PARTS], 0),  # specks beside a few large pieces are not cells
-        ([TISSUE, _rung((100, 99, 60), (90, 80, 50))], 0),
-        ([TISSUE, _rung((0, 0, 0), (0, 0, 0))], 0),
+        ([TISSUE, _sums((100, 99, 60), (90, 80, 50))], 0),
+        ([TISSUE, _sums((0, 0, 0), (0, 0, 0))], 0),
         ([CELLS, TISSUE], 0),
     ],
 )
 def test_the_level_with_most_components_is_chosen_if_it_parts_cells(
-    rungs: list[Rung], chosen: int
+    by_level: list[ComponentSums], chosen: int
 ) -> None:
-    assert choose_apart(rungs) == chosen
+    assert choose_apart(by_level) == chosen
 
 
 def _surveyed(tmp_path: Path, voxels: np.ndarray, *flags: str) -> Survey:
@@ -104,7 +104,7 @@ def test_a_haze_around_far_brighter_structures_is_unsure_and_their_level_is_repo
     (channel,) = _surveyed(tmp_path, voxels).values()
     assert channel.appearance.surface == "unsure"
     assert "may enclose a haze around brighter structures" in channel.appearance.surface_reason
-    inner = channel.ladder[1].value
+    inner = channel.levels[1].value
     assert inner == pytest.approx(10_000, rel=0.3)
     assert f"{inner:.5g} (" in channel.near_levels
     output = capsys.readouterr().err
@@ -120,7 +120,7 @@ def test_a_tile_is_never_more_confident_of_a_level_than_its_channel(tmp_path: Pa
     voxels = 100 + 350 * skin + 2500 * core + rng.normal(0, 90, shape)
     (channel,) = _surveyed(tmp_path, voxels.round().clip(0).astype(np.uint16)).values()
     (tile,) = channel.iso.values()
-    assert channel.appearance.iso_confidence == channel.ladder[0].confidence
+    assert channel.appearance.iso_confidence == channel.levels[0].confidence
     assert tile.confidence == pytest.approx(channel.appearance.iso_confidence)
 
 

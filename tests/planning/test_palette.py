@@ -1,4 +1,4 @@
-"""The palette's colours differ for people with normal and with colour-blind sight."""
+"""The palette's colours differ for people with normal and with colour-blind vision."""
 
 from itertools import combinations
 
@@ -13,7 +13,7 @@ from stereocell.samples.microscope import STAINS
 
 # From linear RGB to the perceived colour: Machado et al., "A Physiologically-based Model for
 # Simulation of Color Vision Deficiency", IEEE TVCG 15(6), 2009, table 1, severity 1
-SIGHTS = {
+VISIONS = {
     "normal": np.eye(3),
     "protanopia": np.array(
         [
@@ -34,8 +34,8 @@ SIGHTS = {
 LIGHTNESS_COUNTS = 1.6
 
 
-def least_difference(colors: NDArray[np.float64], sight: NDArray[np.float64]) -> float:
-    seen = np.clip(colors @ sight.T, 0, 1).astype(np.float32)
+def least_difference(colors: NDArray[np.float64], vision: NDArray[np.float64]) -> float:
+    seen = np.clip(colors @ vision.T, 0, 1).astype(np.float32)
     lab = rgb2lab(to_srgb8(seen))
     return min(
         float(deltaE_ciede2000(lab[a], lab[b], kL=LIGHTNESS_COUNTS))
@@ -43,18 +43,18 @@ def least_difference(colors: NDArray[np.float64], sight: NDArray[np.float64]) ->
     )
 
 
-@pytest.mark.parametrize("sight", SIGHTS)
-def test_any_two_colours_of_the_palette_differ(sight: str) -> None:
+@pytest.mark.parametrize("vision", VISIONS)
+def test_any_two_colours_of_the_palette_differ(vision: str) -> None:
     colors = np.array(PALETTE)
-    assert least_difference(colors, SIGHTS[sight]) > 10
-    assert least_difference(colors[:3], SIGHTS[sight]) > 23
+    assert least_difference(colors, VISIONS[vision]) > 10
+    assert least_difference(colors[:3], VISIONS[vision]) > 23
 
 
-@pytest.mark.parametrize("sight", SIGHTS)
-def test_colours_of_the_sample_s_stains_differ(sight: str) -> None:
+@pytest.mark.parametrize("vision", VISIONS)
+def test_colours_of_the_sample_s_stains_differ(vision: str) -> None:
     rgb = [bytes.fromhex(stain.color) for stain in STAINS]
     colors = np.array([linear_color((code[0], code[1], code[2])) for code in rgb])
-    assert least_difference(colors, SIGHTS[sight]) > 23
+    assert least_difference(colors, VISIONS[vision]) > 23
 
 
 def test_no_colour_is_a_pure_primary_or_too_dark_for_a_dark_ground() -> None:

@@ -256,7 +256,7 @@ def test_the_star_stands_for_channels_without_a_key_of_their_own() -> None:
 
 def test_each_of_several_surfaces_can_be_named() -> None:
     outer, inner = (
-        Channel(0, f"CT {rung}", (1, 1, 1), rung=rung, base="CT") for rung in ("outer", "inner")
+        Channel(0, f"CT {level}", (1, 1, 1), level=level, base="CT") for level in ("outer", "inner")
     )
     other = Channel(1, "PET", (1, 0, 0))
     plan = plan_of(channels=(outer, inner, other), paint={"CT outer": "PET", "PET": "CT"})

@@ -17,7 +17,7 @@ def source(tmp_path: Path) -> Path:
 
 WRONG = [
     (["--iso-scope", "slide"], "--iso-scope is 'slide', expected one of channel, tile"),
-    (["--iso-criterion", "x"], "--iso-criterion is 'x', expected one of ladder"),
+    (["--iso-criterion", "x"], "--iso-criterion is 'x', expected one of levels"),
     (["--as", "labels"], "--as is 'labels', expected intensity"),
     (["--spacing-um", "0,1,1"], "--spacing-um is 0,1,1, expected z,y,x in um"),
     (["--axes", "zz"], "--axes is 'zz', expected z, y and x"),

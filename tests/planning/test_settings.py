@@ -85,7 +85,7 @@ def test_a_user_s_own_preset_is_a_toml_file(tmp_path: Path) -> None:
         ("[sufaces]\n", "unknown section 'sufaces'; did you mean 'surfaces'"),
         ('[iso_values]\nCD31 = "90+c"\n', "iso_values.CD31 is '90+c', expected a voxel value"),
         ('[isovalue]\nscope = "slide"\n', "isovalue.scope is 'slide', expected one of channel"),
-        ('[isovalue]\nrung = "4"\n', "isovalue.rung is '4', expected one of outer, inner"),
+        ('[isovalue]\nlevel = "4"\n', "isovalue.level is '4', expected one of outer, inner"),
         ("[plan]\nlevel = 1.5\n", "plan.level is 1.5, expected a whole number or 'auto'"),
         ("[window]\nlow_percentile = true\n", "low_percentile is True, expected a number"),
         ("[window]\nlow_percentile = 100\n", "expected 0 <= low < high <= 100"),

@@ -30,9 +30,9 @@ def test_the_share_inside_a_level_is_that_of_the_body_alone(
     source = nifti_files.write(tmp_path / "ct.nii.gz", np.diag([1.5, 1.5, 3.0, 1.0]), voxels)
     flags = ("--preset", "ct", "--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / "ct.png"))
     assert main(["iso", str(source), *flags]) == 0
-    told = capsys.readouterr().out
-    assert "as no part of the body (a table, holder, pad or cable)" in told
-    row = next(line.split() for line in told.splitlines() if " * " in line)
+    printed = capsys.readouterr().out
+    assert "as no part of the body (a table, holder, pad or cable)" in printed
+    row = next(line.split() for line in printed.splitlines() if " * " in line)
     inside = next(float(word.rstrip("%")) / 100 for word in row if word.endswith("%"))
     assert cradle.mean() > 0.02
     assert inside == pytest.approx(body.mean(), abs=0.2 * cradle.mean() + 0.005)

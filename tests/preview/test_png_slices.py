@@ -195,7 +195,7 @@ def test_the_widest_spacing_or_dim_info_says_how_nifti_was_acquired(tmp_path: Pa
     for name, spacing, info in (
         ("wide", (1, 4, 1), None),
         ("last", (2, 2, 2), None),
-        ("said", (1, 4, 1), 0),
+        ("stated", (1, 4, 1), 0),
     ):
         nifti = nibabel.Nifti1Image(voxels, np.diag([*spacing, 1]))
         nifti.header.set_xyzt_units("mm")
@@ -204,7 +204,7 @@ def test_the_widest_spacing_or_dim_info_says_how_nifti_was_acquired(tmp_path: Pa
         nibabel.save(nifti, tmp_path / f"{name}.nii")
         about, _ = written(tmp_path / f"{name}.nii", tmp_path / name)
         found[name] = about["plane"], about["shape"][0]
-    assert found == {"wide": ("coronal", 11), "last": ("axial", 12), "said": ("sagittal", 10)}
+    assert found == {"wide": ("coronal", 11), "last": ("axial", 12), "stated": ("sagittal", 10)}
 
 
 @pytest.mark.slow
@@ -228,9 +228,9 @@ def test_microscopy_has_planes_by_its_axes_with_square_pixels(
     assert np.abs(shown[:, 1::3] - middle).max() <= 1  # the middle of three is the voxel's own
     capsys.readouterr()
     assert main(["slices", str(source), "-o", str(tmp_path / "no"), "--plane", "axial"]) == 2
-    told = capsys.readouterr().err
-    assert "states no position in a patient, expected acquired, xy, xz, yz" in told
-    assert "states no position in a patient, expected acquired, xy, xz, yz" in told
+    printed = capsys.readouterr().err
+    assert "states no position in a patient, expected acquired, xy, xz, yz" in printed
+    assert "states no position in a patient, expected acquired, xy, xz, yz" in printed
     assert not (tmp_path / "no").exists()
     two = phantoms.write_ome_tiff(tmp_path / "two.ome.tif", np.stack([voxels, voxels]), "CZYX")
     assert main(["slices", str(two), "-o", str(tmp_path / "no"), "--plane", "axial"]) == 2

@@ -27,7 +27,11 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
     def publish(out: Path, target: object, *more: str) -> tuple[int, dict[str, Any], str]:
         code = main(["publish", str(out), str(target), *more, "--json"])
-        told = capsys.readouterr()
-        return code, json.loads(told.out or "{}"), told.err.splitlines()[-1] if told.err else ""
+        printed = capsys.readouterr()
+        return (
+            code,
+            json.loads(printed.out or "{}"),
+            printed.err.splitlines()[-1] if printed.err else "",
+        )
 
     return publish

@@ -86,9 +86,9 @@ def test_files_of_others_stay_and_end_the_run_before_it_writes(
     site = tmp_path / "site"
     site.mkdir()
     (site / "index.html").write_text("mine")
-    code, _, said = run(out, site)
+    code, _, printed = run(out, site)
     assert code == 1
-    assert "site/index.html: this file exists and was not uploaded by this command" in said
+    assert "site/index.html: this file exists and was not uploaded by this command" in printed
     assert below(site) == {"index.html": b"mine"}
 
 
@@ -138,9 +138,9 @@ def test_a_list_that_is_none_removes_nothing(
     site.mkdir()
     (tmp_path / "secret").write_text("kept")
     (site / LIST).write_bytes(content)
-    code, _, said = run(out, site)
+    code, _, printed = run(out, site)
     assert code == 1
-    assert f"{LIST}: {words}" in said
+    assert f"{LIST}: {words}" in printed
     assert (tmp_path / "secret").exists()
     assert below(site) == {LIST: content}
 
@@ -150,17 +150,17 @@ def test_a_link_in_the_target_leads_nowhere_else(out: Path, run: Run, tmp_path: 
     site.mkdir()
     other.mkdir()
     (site / "assets").symlink_to(other)
-    code, _, said = run(out, site)
+    code, _, printed = run(out, site)
     assert code == 1
-    assert "leads to" in said
+    assert "leads to" in printed
     assert not below(other)
 
 
 def test_a_damaged_bundle_is_not_published(out: Path, run: Run, tmp_path: Path) -> None:
     (out / "bundle/sw.js").write_bytes(b"Self;")
-    code, _, said = run(out, tmp_path / "site")
+    code, _, printed = run(out, tmp_path / "site")
     assert code == 1
-    assert f"bundle/sw.js: damaged: run `stereocell bundle '{out}'` first" in said
+    assert f"bundle/sw.js: damaged: run `stereocell bundle '{out}'` first" in printed
     assert not (tmp_path / "site").exists()
     assert run(tmp_path / "nothing", tmp_path / "site")[0] == 1
 
@@ -169,8 +169,8 @@ def test_a_place_in_out_or_a_plain_host_is_refused(out: Path, run: Run) -> None:
     assert "inside OUT" in run(out, out / "bundle" / "x")[2]
     assert "files can't be written over http" in run(out, "https://me.example/x")[2]
     assert run(out, "nowhere://x/y")[0] == 1
-    code, _, said = run(out, out.parent / "site", "--url", "file:///etc")
-    assert (code, "expected an address such as https://" in said) == (2, True)
+    code, _, printed = run(out, out.parent / "site", "--url", "file:///etc")
+    assert (code, "expected an address such as https://" in printed) == (2, True)
 
 
 @pytest.fixture
@@ -200,22 +200,22 @@ def test_every_file_is_fetched_as_browsers_do(
 ) -> None:
     site = tmp_path / "site" / "my specimen"
     url = f"{host}/my%20specimen"
-    code, done, said = run(out, site, "--url", url)
-    assert (code, done["address"]) == (0, f"{url}/"), said
+    code, done, printed = run(out, site, "--url", url)
+    assert (code, done["address"]) == (0, f"{url}/"), printed
     (site / "volumes/r0_c0.ktx2").write_bytes(bytes(256 * 40))  # of the same size
-    code, _, said = run(out, site, "--url", url)
+    code, _, printed = run(out, site, "--url", url)
     assert code == 1
-    assert f"{url}/volumes/r0_c0.ktx2: found different bytes" in said
-    assert "changed since it was published" in said
+    assert f"{url}/volumes/r0_c0.ktx2: found different bytes" in printed
+    assert "changed since it was published" in printed
     code, mended, _ = run(out, site, "--url", url, "--force")
     assert (code, mended["uploaded"]) == (0, 1)
-    code, _, said = run(out, site, "--url", f"{host}/elsewhere")
+    code, _, printed = run(out, site, "--url", f"{host}/elsewhere")
     assert code == 1
-    assert "the host answered 404" in said
+    assert "the host answered 404" in printed
     monkeypatch.setitem(_Quiet.extensions_map, ".js", "text/plain")
-    code, _, said = run(out, site, "--url", url)
+    code, _, printed = run(out, site, "--url", url)
     assert code == 1
-    assert "found the type text/plain, which browsers don't accept as text/javascript" in said
+    assert "found the type text/plain, which browsers don't accept as text/javascript" in printed
 
 
 @pytest.fixture(scope="module")
@@ -230,11 +230,11 @@ def test_an_object_store_gets_types_and_a_second_run_nothing(
 ) -> None:
     files = store.files()
     files.pipe_file("bucket/mine/notes.txt", b"mine")
-    code, _, said = run(out, "s3://bucket/mine")
+    code, _, printed = run(out, "s3://bucket/mine")
     assert code == 1
-    assert "s3://bucket/mine: holds something else (notes.txt), expected nothing or a" in said
-    code, done, said = run(out, "s3://bucket/mine", "--force")
-    assert code == 0, said
+    assert "s3://bucket/mine: holds something else (notes.txt), expected nothing or a" in printed
+    code, done, printed = run(out, "s3://bucket/mine", "--force")
+    assert code == 0, printed
     # a folder of S3 has no page
     assert done["address"] == f"{store.endpoint}/bucket/mine/index.html"
     with urllib.request.urlopen(done["address"]) as page:
@@ -267,8 +267,8 @@ def test_an_object_store_gets_types_and_a_second_run_nothing(
 def test_any_file_system_of_fsspec_will_do(out: Path, run: Run) -> None:
     import fsspec
 
-    code, done, said = run(out, "memory://a site")
-    assert code == 0, said
+    code, done, printed = run(out, "memory://a site")
+    assert code == 0, printed
     assert done["address"] is None
     files = fsspec.filesystem("memory")
     assert files.cat_file("/a site/volumes/r0_c0.ktx2") == FILES["volumes/r0_c0.ktx2"]

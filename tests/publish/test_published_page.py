@@ -37,15 +37,17 @@ def test_bundle_of_another_source_does_not_replace_a_page_of_the_same_name(
 ) -> None:
     write(tmp_path / "other", FILES, fingerprint=fingerprint)
     other, there = tmp_path / "other" / "bundle", below(site)
-    code, _, said = run(other, site)
+    code, _, printed = run(other, site)
     assert code == 1
-    assert "holds a published page of 'bbb" in said
-    assert "(0123456789ab), expected one of 'bbb" in said
-    assert f"{words}: choose another place, or --force replaces it" in said
+    assert "holds a published page of 'bbb" in printed
+    assert "(0123456789ab), expected one of 'bbb" in printed
+    assert f"{words}: choose another place, or --force replaces it" in printed
     assert below(site) == there
     assert run(other, site, "--force")[0] == 0
-    code, _, said = run(bundle, site)  # the page is now of the other source, or of an unknown one
-    assert (code, words in said) == (1, True)
+    code, _, printed = run(
+        bundle, site
+    )  # the page is now of the other source, or of an unknown one
+    assert (code, words in printed) == (1, True)
 
 
 @pytest.mark.parametrize("content", [b"mine", FILES["index.html"].replace(b"html", b"HTML")])
@@ -60,11 +62,11 @@ def test_file_of_a_page_that_was_edited_stays_without_force(
         write(out, {"index.html": b"<!doctype html>new"})
     there = below(site)
     for _ in range(2):  # a run that was refused changes no later one
-        code, _, said = run(out / "bundle", site)
+        code, _, printed = run(out / "bundle", site)
         assert code == 1
-        assert "index.html: " in said
-        assert "changed since it was published" in said
-        assert "elsewhere and remove it there, or --force replaces it" in said
+        assert "index.html: " in printed
+        assert "changed since it was published" in printed
+        assert "elsewhere and remove it there, or --force replaces it" in printed
         assert below(site) == there
     assert run(out / "bundle", site, "--force")[0] == 0
     assert (site / "index.html").read_bytes() == (out / "bundle/index.html").read_bytes()
@@ -77,8 +79,8 @@ def test_edited_file_that_the_new_bundle_lacks_is_not_removed_without_force(
     (site / "sw.js").write_bytes(b"mine")
     (out / "bundle/sw.js").unlink()
     write(out, {})
-    code, _, said = run(out / "bundle", site)
-    assert (code, "sw.js: changed since it was published" in said) == (1, True)
+    code, _, printed = run(out / "bundle", site)
+    assert (code, "sw.js: changed since it was published" in printed) == (1, True)
     assert (site / "sw.js").read_bytes() == b"mine"
     assert run(out / "bundle", site, "--force")[0] == 0
     assert not (site / "sw.js").exists()
@@ -94,8 +96,8 @@ def test_a_file_that_is_damaged_on_its_way_is_uploaded_again(
 
     with monkeypatch.context() as patch:
         patch.setattr(FolderTarget, "write", spoils)
-        code, _, said = run(out, tmp_path / "site")
-    assert (code, "run the same command to upload it again" in said) == (1, True)
+        code, _, printed = run(out, tmp_path / "site")
+    assert (code, "run the same command to upload it again" in printed) == (1, True)
     assert run(out, tmp_path / "site")[1]["uploaded"] == 1
 
 
@@ -112,12 +114,14 @@ def test_manifest_that_was_edited_is_named_wherever_the_bundle_lies(
 ) -> None:
     for place in (bundle, site):
         _raise_bounds(place)
-        code, _, said = run(place, tmp_path / "copy")
+        code, _, printed = run(place, tmp_path / "copy")
         assert code == 1
-        assert f"{place / 'manifest.json'}: damaged or changed by hand: its content has SHA" in said
-        assert "run `stereocell bundle " in said
-        (told,) = [line.detail for line in check(place) if line.name == "manifest"]
-        assert "manifest.json: damaged or changed by hand" in told
+        assert (
+            f"{place / 'manifest.json'}: damaged or changed by hand: its content has SHA" in printed
+        )
+        assert "run `stereocell bundle " in printed
+        (fault,) = [line.detail for line in check(place) if line.name == "manifest"]
+        assert "manifest.json: damaged or changed by hand" in fault
     assert not (tmp_path / "copy").exists()
 
 
@@ -131,8 +135,8 @@ def test_manifest_of_an_earlier_version_or_of_another_list_is_not_published(
     assert "manifest.json: found no hash of its content" in run(bundle, tmp_path / "site")[2]
     write(out, {"sw.js": b"other;"})
     shutil.copy(out / "bundle/manifest.json", file)
-    said = run(bundle, tmp_path / "site")[2]
-    assert "manifest.json: damaged, names another files.json: run `stereocell bundle " in said
+    printed = run(bundle, tmp_path / "site")[2]
+    assert "manifest.json: damaged, names another files.json: run `stereocell bundle " in printed
     file.unlink()
     assert "manifest.json is missing" in run(bundle, tmp_path / "site")[2]
     assert not (tmp_path / "site").exists()

@@ -61,22 +61,22 @@ def test_the_share_of_chunks_that_are_not_stored_is_reported(
         scales=[{"z": 1, "y": 1, "x": 1}],
     )  # fmt: skip
     shards, blocks = write_shards(tmp_path / "c.ome.zarr"), write_n5(tmp_path / "a.n5", BODY)
-    told = "({}) are not stored: they are read as {}, and the format does not state"
+    note = "({}) are not stored: they are read as {}, and the format does not state"
     for path, lost, words in (
-        (chunks, "0/c/1/0/0", "1 of 4 chunks of level 0 " + told.format("25.00%", 0)),
-        (flat, "0/1/2/0/0", "1 of 8 chunks of level 0 " + told.format("12.50%", 0)),
-        (shards, "0/c/0/1/0", "1 of 4 shards of level 0 " + told.format("25.00%", 3)),
-        (blocks, "1/0/1", "1 of 24 blocks of level 0 " + told.format("4.17%", 0)),
+        (chunks, "0/c/1/0/0", "1 of 4 chunks of level 0 " + note.format("25.00%", 0)),
+        (flat, "0/1/2/0/0", "1 of 8 chunks of level 0 " + note.format("12.50%", 0)),
+        (shards, "0/c/0/1/0", "1 of 4 shards of level 0 " + note.format("25.00%", 3)),
+        (blocks, "1/0/1", "1 of 24 blocks of level 0 " + note.format("4.17%", 0)),
     ):
-        code, said = plan(path, tmp_path, capsys)
-        assert (code, "not stored" in said) == (0, False)
+        code, printed = plan(path, tmp_path, capsys)
+        assert (code, "not stored" in printed) == (0, False)
         (path / lost).unlink()
-        code, said = plan(path, tmp_path, capsys)
+        code, printed = plan(path, tmp_path, capsys)
         assert code == 0
-        assert words in said
-    code, said = plan(write_hdf5(tmp_path / "a.h5", 6), tmp_path, capsys)
+        assert words in printed
+    code, printed = plan(write_hdf5(tmp_path / "a.h5", 6), tmp_path, capsys)
     assert code == 0
-    assert "2 of 8 chunks of level 0 " + told.format("25.00%", 9) in said
+    assert "2 of 8 chunks of level 0 " + note.format("25.00%", 9) in printed
 
 
 @pytest.mark.slow
@@ -88,7 +88,7 @@ def test_chunks_of_other_channels_and_regions_are_not_counted(
         scales=[{"z": 1, "y": 1, "x": 1}],
     )  # fmt: skip
     (path / "0/c/1/3/0/0").unlink()
-    for flags, is_told in (
+    for flags, is_reported in (
         ([], True),
         (["--channels", "0"], False),
         (["--region", "0:12,0:48,0:36"], False),
@@ -97,7 +97,7 @@ def test_chunks_of_other_channels_and_regions_are_not_counted(
         capsys.readouterr()
         plan_it = ["plan", str(path), "-o", str(tmp_path / "out"), "--as", "intensity"]
         assert main([*plan_it, *flags]) == 0
-        assert ("not stored" in capsys.readouterr().err) == is_told
+        assert ("not stored" in capsys.readouterr().err) == is_reported
         shutil.rmtree(tmp_path / "out")
 
 
@@ -106,9 +106,9 @@ def test_a_level_without_any_chunk_is_refused(
 ) -> None:
     path = phantoms.write_ome_zarr(tmp_path / "a.ome.zarr", [BODY], chunks=(4, 48, 36))
     shutil.rmtree(path / "0" / "c")
-    code, said = plan(path, tmp_path, capsys)
+    code, printed = plan(path, tmp_path, capsys)
     assert code == 1
-    assert "level 0: found none of 4 chunks, expected the chunks that hold voxels" in said
+    assert "level 0: found none of 4 chunks, expected the chunks that hold voxels" in printed
 
 
 @pytest.mark.parametrize("seed", range(5))

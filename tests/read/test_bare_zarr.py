@@ -47,9 +47,9 @@ def test_axes_come_from_names_of_dimensions_or_the_user(tmp_path: Path, version:
     named: dict[str, Any] = {"dimension_names": list("zyxc")} if version == 3 else {}
     if version == 2:
         attributes["_ARRAY_DIMENSIONS"] = list("zyxc")  # type: ignore[assignment]
-    told = write(tmp_path / "a.zarr", version, stored, attributes=attributes, **named)
+    lines = write(tmp_path / "a.zarr", version, stored, attributes=attributes, **named)
     bare = write(tmp_path / "b.zarr", version, stored)
-    for dataset in (read.open(told), read.open(bare, axes="zyxc", spacing_um=SIZE_UM)):
+    for dataset in (read.open(lines), read.open(bare, axes="zyxc", spacing_um=SIZE_UM)):
         assert dataset.levels[0].spacing_um == SIZE_UM
         np.testing.assert_array_equal(dataset.read(1, dataset.levels[0].box).voxels, body + 1)
         assert dataset.notes == ()

@@ -73,8 +73,8 @@ def test_the_content_of_a_compressed_file_is_checked(
 ) -> None:
     (tmp_path / name).write_bytes(gzip.compress(content))
     line = refusal(tmp_path / name)
-    told = {b"": "nothing", LFS: "a pointer of Git LFS", b"<html>": "an HTML page", b"{}": "JSON"}
-    assert f"a gzip file of {told[content]}" in line
+    kinds = {b"": "nothing", LFS: "a pointer of Git LFS", b"<html>": "an HTML page", b"{}": "JSON"}
+    assert f"a gzip file of {kinds[content]}" in line
 
 
 def _tiff(path: Path) -> None:
@@ -92,7 +92,7 @@ def _packed_nifti(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "name", "told"),
+    ("make", "name", "expected"),
     [
         (_tiff, "a.mrc", f"found a TIFF file, expected MRC{NAMED} .tif"),
         (_tiff, "a.nii.gz", "found a TIFF file, expected NIfTI or Analyze, packed by gzip: if"),
@@ -105,15 +105,15 @@ def _packed_nifti(path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_file_with_the_wrong_ending_is_refused_with_the_right_one(
-    tmp_path: Path, make: Callable[[Path], None], name: str, told: str | None
+    tmp_path: Path, make: Callable[[Path], None], name: str, expected: str | None
 ) -> None:
     path = tmp_path / name
     make(path)
-    if told is None:
+    if expected is None:
         read.open(path)
         return
-    assert told in refusal(path)
-    ending = told.rpartition("name it ")[2]
+    assert expected in refusal(path)
+    ending = expected.rpartition("name it ")[2]
     if ending.startswith("."):
         renamed = path.rename(tmp_path / f"b{ending}")
         assert read.open(renamed).levels[0].shape == f_phantom().shape
@@ -159,7 +159,7 @@ def test_a_folder_without_a_format_is_refused_with_its_content(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("head", "told"),
+    ("head", "expected"),
     [
         (b"CDF\x02\0\0\0\0", "a netCDF-3 file (`nccopy -k nc4 IN OUT` makes netCDF-4)"),
         (b"MATLAB 5.0 MAT-file", "save it in MATLAB with -v7.3"),
@@ -167,11 +167,11 @@ def test_a_folder_without_a_format_is_refused_with_its_content(tmp_path: Path) -
     ],
 )
 def test_files_of_other_programs_are_refused_with_a_remedy(
-    tmp_path: Path, head: bytes, told: str
+    tmp_path: Path, head: bytes, expected: str
 ) -> None:
     path = tmp_path / f"a.{'png' if b'PNG' in head else 'mat'}"
     path.write_bytes(head + bytes(600))
-    assert told in refusal(path)
+    assert expected in refusal(path)
 
 
 def test_hdf5_without_a_volume_is_refused_with_its_content(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ refusal = refusing(read.open)
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "told", "remedy"),
+    ("name", "content", "expected", "remedy"),
     [
         ("a.oib", OLE, "Olympus FluoView", BIOFORMATS),
         ("a.oif", "[Version Info]\r\n".encode("utf-16"), "Olympus FluoView", BIOFORMATS),
@@ -53,11 +53,11 @@ refusal = refusing(read.open)
     ],
 )
 def test_the_format_and_the_remedy_are_named(
-    tmp_path: Path, name: str, content: bytes, told: str, remedy: str
+    tmp_path: Path, name: str, content: bytes, expected: str, remedy: str
 ) -> None:
     (tmp_path / name).write_bytes(content)
     line = refusal(tmp_path / name)
-    assert told in line
+    assert expected in line
     assert remedy in line
     assert "JSON" not in line
 

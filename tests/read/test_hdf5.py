@@ -142,8 +142,8 @@ def test_an_unknown_filter_is_named_with_a_remedy(
 def test_an_incomplete_file_is_refused_in_one_line(tmp_path: Path, suffix: str) -> None:
     path = write(tmp_path / "a.h5", voxels=np.zeros((9, 300, 300)))
     content = path.read_bytes()
-    for spoilt in (b"", b"no HDF5 at all", content[:512], content[: len(content) // 2]):
-        (tmp_path / f"b{suffix}").write_bytes(spoilt)
+    for damaged in (b"", b"no HDF5 at all", content[:512], content[: len(content) // 2]):
+        (tmp_path / f"b{suffix}").write_bytes(damaged)
         refusal(tmp_path / f"b{suffix}")
     half = f"cut short at byte {len(content) // 2} of {len(content)}"
     assert half in refusal(tmp_path / f"b{suffix}")
@@ -301,7 +301,7 @@ def write_chunks(path: Path, libver: str = "earliest", **options: Any) -> dict[A
 
 
 @pytest.mark.parametrize(
-    ("offset", "value", "told"),
+    ("offset", "value", "expected"),
     [
         (36, 0x20, "no look-up finds"),  # the position within a voxel, which is always 0
         (8, 8, "twice"),
@@ -312,14 +312,14 @@ def write_chunks(path: Path, libver: str = "earliest", **options: Any) -> dict[A
     ],
 )
 def test_an_index_of_chunks_that_contradicts_itself_is_refused(
-    tmp_path: Path, offset: int, value: int, told: str
+    tmp_path: Path, offset: int, value: int, expected: str
 ) -> None:
     path = tmp_path / "a.h5"
     entries = write_chunks(path, compression="gzip")
     damage(path, entries[0], offset, value)
     line = window_refusal(path)
     assert "/raw: index of chunks: (" in line
-    assert told in line
+    assert expected in line
 
 
 @pytest.mark.slow

@@ -347,10 +347,10 @@ def test_voxels_after_those_that_a_header_describes_are_reported(tmp_path: Path)
     plane = f_phantom()[:, 0].nbytes  # the smallest plane
     for path in paths:
         whole = path.read_bytes()
-        for rest, is_told in ((plane - 1, False), (plane, True)):
+        for rest, is_reported in ((plane - 1, False), (plane, True)):
             path.write_bytes(whole + bytes(rest))
-            told = f"left out: {rest:,} bytes behind the voxels"
-            assert any(told in note for note in read.open(path).notes) == is_told, path
+            expected = f"left out: {rest:,} bytes behind the voxels"
+            assert any(expected in note for note in read.open(path).notes) == is_reported, path
 
 
 def test_segments_of_slicer_are_objects_with_their_names(tmp_path: Path) -> None:

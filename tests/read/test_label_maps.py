@@ -79,18 +79,20 @@ def test_numbers_that_a_float_can_t_distinguish_are_refused_with_the_reason(
     stored = np.full((5, 6, 7), 2.0**53 + 2, dtype)
     tifffile.imwrite(tmp_path / "l.tif", stored, metadata={"axes": "ZYX"})
     labels = labels_of(tmp_path / "l.tif")
-    told = rf"found 900719925474099[24] in {dtype}, which rounds whole numbers .* int64"
-    with pytest.raises(SourceError, match=told):
+    expected = rf"found 900719925474099[24] in {dtype}, which rounds whole numbers .* int64"
+    with pytest.raises(SourceError, match=expected):
         labels.read(labels.dataset.levels[0].box)
 
 
-@pytest.mark.parametrize(("value", "told"), [(-2, "found -2"), (0.5, "found 0.5"), (np.inf, "inf")])
-def test_other_numbers_are_refused_as_labels(tmp_path: Path, value: float, told: str) -> None:
+@pytest.mark.parametrize(
+    ("value", "expected"), [(-2, "found -2"), (0.5, "found 0.5"), (np.inf, "inf")]
+)
+def test_other_numbers_are_refused_as_labels(tmp_path: Path, value: float, expected: str) -> None:
     stored = np.full((5, 6, 7), 5, np.float32)
     stored[1, 1, 1] = value
     tifffile.imwrite(tmp_path / "l.tif", stored, metadata={"axes": "ZYX"})
     labels = labels_of(tmp_path / "l.tif")
-    with pytest.raises(SourceError, match=told):
+    with pytest.raises(SourceError, match=expected):
         labels.read(labels.dataset.levels[0].box)
 
 

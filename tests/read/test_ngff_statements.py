@@ -243,7 +243,7 @@ def test_a_second_image_that_is_not_a_volume_is_listed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("stored", "image", "group", "told"),
+    ("stored", "image", "group", "expected"),
     [
         (2, "0.5", None, "0.5 is stated, which uses Zarr v3, but the files are Zarr v2"),
         (3, "0.4", "0.5", "`version` of the image states 0.4, `version` of the group states 0.5"),
@@ -252,7 +252,7 @@ def test_a_second_image_that_is_not_a_volume_is_listed(tmp_path: Path) -> None:
     ],
 )
 def test_a_version_that_the_files_contradict_is_noted(
-    tmp_path: Path, stored: Any, image: str | None, group: str | None, told: str
+    tmp_path: Path, stored: Any, image: str | None, group: str | None, expected: str
 ) -> None:
     axes = [{"name": a, "type": "space", "unit": "micrometer"} for a in "zyx"]
     scale = [{"type": "scale", "scale": [0.5, 0.2, 0.2]}]
@@ -267,6 +267,6 @@ def test_a_version_that_the_files_contradict_is_noted(
     root.attrs.update({"ome": ome} if stored == 3 else ome)
     dataset = read.open(tmp_path / "a.zarr")
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, BODY)
-    assert bool(dataset.notes) == bool(told)
+    assert bool(dataset.notes) == bool(expected)
     assert all("version of OME-Zarr" in note for note in dataset.notes)
-    assert told in "".join(dataset.notes)
+    assert expected in "".join(dataset.notes)

@@ -124,8 +124,8 @@ def test_nan_is_read_as_the_smallest_finite_value_and_is_noted(tmp_path: Path) -
     bare = values.copy()
     bare[:, :5] = np.nan
     dataset = read.open(write(tmp_path / "a.nii.gz", grid(), bare))
-    told = f"{22 * 5 * 26:,} voxels are NaN or infinite: read as the smallest finite value"
-    assert dataset.notes == (told,)
+    note_text = f"{22 * 5 * 26:,} voxels are NaN or infinite: read as the smallest finite value"
+    assert dataset.notes == (note_text,)
     expected = np.nan_to_num(bare, nan=float(np.nanmin(bare)))
     write(tmp_path / "b.nii.gz", grid(), expected)
     voxels = whole(read.open(tmp_path / "b.nii.gz"))
@@ -270,16 +270,16 @@ def test_garbled_files_open_or_raise_a_source_error(tmp_path: Path, suffix: str)
             whole(read.open(path))
 
 
-@pytest.mark.parametrize("said", ["intent", "table"])
+@pytest.mark.parametrize("expected", ["intent", "table"])
 def test_labels_that_the_header_states_end_the_plan(
-    tmp_path: Path, said: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, expected: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A mask of one object, which the voxels alone would not reveal as labels."""
     voxels = np.zeros(SHAPE, np.uint8)
     voxels[5:12, 5:12, 5:12] = 1
     nifti = nibabel.Nifti1Image(voxels, np.diag([2.0, 2.0, 2.0, 1.0]))
     nifti.header.set_xyzt_units("mm")
-    if said == "intent":
+    if expected == "intent":
         nifti.header.set_intent("label")
     else:
         text = b"<CaretExtension><LabelTable><Label Key='1'>JANE DOE</Label></LabelTable>"
@@ -287,9 +287,9 @@ def test_labels_that_the_header_states_end_the_plan(
     nibabel.save(nifti, tmp_path / "m.nii.gz")
     source, out = str(tmp_path / "m.nii.gz"), str(tmp_path / "out")
     assert main(["plan", source, "-o", out]) == 2
-    told = capsys.readouterr().err
-    assert ("intent code 1002" if said == "intent" else "a table of labels") in told
-    assert "JANE" not in told
+    printed = capsys.readouterr().err
+    assert ("intent code 1002" if expected == "intent" else "a table of labels") in printed
+    assert "JANE" not in printed
     assert main(["plan", source, "-o", out, "--as", "intensity"]) == 0
 
 

@@ -35,19 +35,19 @@ def test_the_namespace_of_every_version_is_accepted(version: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("inside", "told"),
+    ("inside", "expected"),
     [
         ('<Image><Pixels PhysicalSizeZ="deep"/></Image>', "PhysicalSizeZ: found 'deep'"),
         ('<Image><Pixels><Channel Color="red"/></Pixels></Image>', "Channel Color: found 'red'"),
     ],
 )
-def test_invalid_metadata_are_refused_with_their_field(inside: str, told: str) -> None:
-    with pytest.raises(SourceError, match=told):
+def test_invalid_metadata_are_refused_with_their_field(inside: str, expected: str) -> None:
+    with pytest.raises(SourceError, match=expected):
         images(inside)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected"),
     [
         ("", "OME-XML: found none"),
         ("ImageJ=1.53\nimages=5", "OME-XML: found none"),
@@ -56,6 +56,6 @@ def test_invalid_metadata_are_refused_with_their_field(inside: str, told: str) -
         ('<!DOCTYPE x [<!ENTITY a "b">]><OME/>', "found a DOCTYPE"),
     ],
 )
-def test_text_that_is_not_ome_xml_is_refused(text: str, told: str) -> None:
-    with pytest.raises(SourceError, match=told):
+def test_text_that_is_not_ome_xml_is_refused(text: str, expected: str) -> None:
+    with pytest.raises(SourceError, match=expected):
         parse(text, "x.tif")

@@ -112,9 +112,9 @@ def test_a_file_that_moved_is_known_by_its_own_id(home: Path) -> None:
 def test_the_command_refuses_in_one_line(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tiff_of(home / "x.ome.tif", "../other/secret.ome.tif")
     assert main(["plan", str(source), "-o", str(home.parent / "out")]) == 1
-    told = capsys.readouterr().err
-    assert told.startswith(f"stereocell: {source}: OME-XML: UUID FileName")
-    assert told.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert printed.startswith(f"stereocell: {source}: OME-XML: UUID FileName")
+    assert printed.count("\n") == 1
     assert not (home.parent / "out").exists()
 
 

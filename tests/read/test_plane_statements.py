@@ -152,7 +152,7 @@ def test_the_missing_value_of_gdal_is_not_a_measurement(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("step_um", "unit", "told"),
+    ("step_um", "unit", "expected"),
     [
         (2.0, "\u00b5m", "differs by up to 30 um (120 voxels): the planes are not shifted along x"),
         (0.002, "mm", "differs by up to 30 um (120 voxels)"),
@@ -161,15 +161,15 @@ def test_the_missing_value_of_gdal_is_not_a_measurement(tmp_path: Path) -> None:
     ],
 )
 def test_planes_that_lie_beside_each_other_are_noted(
-    tmp_path: Path, step_um: float, unit: str, told: str
+    tmp_path: Path, step_um: float, unit: str, expected: str
 ) -> None:
     path = tmp_path / "a.ome.tif"
     aside = {"PositionX": [step_um * n for n in range(16)], "PositionXUnit": [unit] * 16}
     sizes = {"PhysicalSizeX": 0.25, "PhysicalSizeY": 0.2, "PhysicalSizeZ": 0.5}
     tifffile.imwrite(path, BODY, metadata={"axes": "ZYX", "Plane": aside, **sizes})
     notes = read.open(path).notes
-    assert len(notes) == bool(told)
-    assert all("PositionX" in note and told in note for note in notes)
+    assert len(notes) == bool(expected)
+    assert all("PositionX" in note and expected in note for note in notes)
 
 
 def test_files_of_planes_that_lie_beside_each_other_are_noted(tmp_path: Path) -> None:

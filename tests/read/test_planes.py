@@ -231,7 +231,7 @@ def test_a_pattern_explains_the_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("pattern", "told"),
+    ("pattern", "expected"),
     [
         ("y_{z}.tif", "none of 3 files matches, such as 'x_z0.tif'"),
         ("x_z{n}.tif", "{n} is unknown"),
@@ -239,9 +239,11 @@ def test_a_pattern_explains_the_names(tmp_path: Path) -> None:
         ("(((", "none of 3 files matches"),
     ],
 )
-def test_a_pattern_that_fits_nothing_is_refused(tmp_path: Path, pattern: str, told: str) -> None:
+def test_a_pattern_that_fits_nothing_is_refused(
+    tmp_path: Path, pattern: str, expected: str
+) -> None:
     folder = fill(tmp_path, {f"x_z{z}.tif": volume(4, 4) for z in range(3)})
-    assert told in refusal(folder, UsageError, pattern=pattern)
+    assert expected in refusal(folder, UsageError, pattern=pattern)
 
 
 def test_missing_planes_are_refused_by_name(tmp_path: Path) -> None:
@@ -254,7 +256,7 @@ def test_missing_planes_are_refused_by_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "told"),
+    ("names", "expected"),
     [
         ([f"x_z{z}.tif" for z in (0, 2, 4, 6)], "4 planes (0 to 6; no file is numbered 1, 3, 5)"),
         ([f"x_z{z}_c{c}.tif" for z in range(3) for c in (1, 3)], "(c1, c3; no file is numbered 2)"),
@@ -262,10 +264,12 @@ def test_missing_planes_are_refused_by_name(tmp_path: Path) -> None:
         ([f"x_z{z}.tif" for z in (10, 11, 12)], "3 planes (10 to 12)"),
     ],
 )
-def test_numbers_that_no_name_has_are_noted(tmp_path: Path, names: list[str], told: str) -> None:
+def test_numbers_that_no_name_has_are_noted(
+    tmp_path: Path, names: list[str], expected: str
+) -> None:
     folder = fill(tmp_path, dict.fromkeys(names, volume(4, 4)))
     notes = read.open(folder, spacing_um=GIVEN).notes
-    assert any(told in note for note in notes), notes
+    assert any(expected in note for note in notes), notes
 
 
 def test_numbers_that_are_not_consecutive_are_refused(tmp_path: Path) -> None:
@@ -282,24 +286,24 @@ def test_two_files_of_one_plane_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("odd", "told"),
+    ("odd", "expected"),
     [
         (volume(10, 15), "found 15 x 10 pixels of uint16, expected 14 x 10 pixels of uint16"),
         (volume(10, 14, dtype="uint8"), "found 14 x 10 pixels of uint8, expected"),
         (volume(10, 14, 3, dtype="uint16"), "3 samples a pixel"),
     ],
 )
-def test_planes_that_differ_are_named(tmp_path: Path, odd: NDArray[Any], told: str) -> None:
+def test_planes_that_differ_are_named(tmp_path: Path, odd: NDArray[Any], expected: str) -> None:
     folder = fill(tmp_path, {f"z{z}.tif": volume(10, 14) for z in range(5)} | {"z3.tif": odd})
     line = refusal(folder)
-    assert told in line
+    assert expected in line
     assert "'z3.tif'" in line
 
 
 def test_files_that_do_not_form_a_volume_are_refused(tmp_path: Path) -> None:
     flat = fill(tmp_path / "flat", {"DAPI.tif": volume(4, 4), "GFP.tif": volume(4, 4)})
     assert "whose names don't count planes" in refusal(flat)
-    for names, told in (
+    for names, expected in (
         (("a b", "c", "d e f"), "named alike"),
         (("p1", "p2"), "expected numbers or words for planes"),
     ):
@@ -308,7 +312,7 @@ def test_files_that_do_not_form_a_volume_are_refused(tmp_path: Path) -> None:
         for name in names:
             path = mixed / f"{name}.tif"
             tifffile.imwrite(path, volume(5, 9, 9), imagej=True, metadata={"axes": "ZYX"})
-        assert told in refusal(mixed)
+        assert expected in refusal(mixed)
 
 
 def test_other_kinds_of_images_are_left_out_and_noted(tmp_path: Path) -> None:
@@ -320,24 +324,24 @@ def test_other_kinds_of_images_are_left_out_and_noted(tmp_path: Path) -> None:
     (tmp_path / "._z0.tif").write_bytes(b"of macOS")
     dataset = read.open(tmp_path, spacing_um=GIVEN)
     np.testing.assert_array_equal(read_all(dataset)[0], stored)
-    told = " | ".join(dataset.notes)
+    joined = " | ".join(dataset.notes)
     for words in (
         "1 image in folders below left out",
         "7 TIFF are read, 1 other left out",
         "1 thumbnail left out",
         "1 file with another name left out",
     ):
-        assert words in told
+        assert words in joined
 
 
 def test_a_plane_that_is_cut_short_or_not_an_image_is_named(tmp_path: Path) -> None:
     for suffix, write in (("tif", tiff), ("png", png), ("jpg", pillow)):
-        for spoilt in (0.0, 0.3, 0.9):
-            folder = tmp_path / f"{suffix}{spoilt}"
+        for share in (0.0, 0.3, 0.9):
+            folder = tmp_path / f"{suffix}{share}"
             pixels = volume(40, 44, dtype="uint8")
             fill(folder, {f"z{z}.{suffix}": pixels for z in range(4)}, write)
             content = (folder / f"z2.{suffix}").read_bytes()
-            (folder / f"z2.{suffix}").write_bytes(content[: int(spoilt * len(content))])
+            (folder / f"z2.{suffix}").write_bytes(content[: int(share * len(content))])
             assert f"z2.{suffix}" in refusal(folder)
         (folder / f"z2.{suffix}").write_text("<html>")
         assert "found an HTML page" in refusal(folder)

@@ -60,12 +60,14 @@ def test_numbers_of_slices_count_lines_of_the_camera(tmp_path: Path) -> None:
     assert "the slices' numbering states 5 pixels" in " ".join(dataset.notes)
 
 
-@pytest.mark.parametrize(("count", "is_told"), [(48, True), (len(VOXELS), False)])
-def test_a_log_that_counts_other_slices_is_noted(tmp_path: Path, count: int, is_told: bool) -> None:
+@pytest.mark.parametrize(("count", "is_reported"), [(48, True), (len(VOXELS), False)])
+def test_a_log_that_counts_other_slices_is_noted(
+    tmp_path: Path, count: int, is_reported: bool
+) -> None:
     lines = f"Sections Count={count}\nPixel Size (um)=9.92\n"
     dataset = scan(tmp_path / "s", ".bmp", LOG.format("", lines))
-    told = f"found {len(VOXELS)} images, and the log states {count}"
-    assert any(told in note for note in dataset.notes) == is_told
+    expected = f"found {len(VOXELS)} images, and the log states {count}"
+    assert any(expected in note for note in dataset.notes) == is_reported
 
 
 @pytest.mark.parametrize("log", ["", "[Reconstruction]\nPixel Size (um)=none\n", "Pixel Size=3\n"])
@@ -75,15 +77,16 @@ def test_a_log_without_a_size_is_ignored(tmp_path: Path, log: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "told"), [("P", "found pixels of kind P, expected grey"), ("1", "of kind 1, expected")]
+    ("mode", "expected"),
+    [("P", "found pixels of kind P, expected grey"), ("1", "of kind 1, expected")],
 )
-def test_bmp_of_other_pixels_is_refused(tmp_path: Path, mode: str, told: str) -> None:
+def test_bmp_of_other_pixels_is_refused(tmp_path: Path, mode: str, expected: str) -> None:
     for plane in range(3):
         image = Pillow.new(mode, (9, 8))
         if mode == "P":
             image.putpalette([value for i in range(256) for value in (i, 0, 255 - i)])
         image.save(tmp_path / f"s{plane}.bmp")
-    with pytest.raises(SourceError, match=told):
+    with pytest.raises(SourceError, match=expected):
         read.open(tmp_path)
 
 

@@ -107,7 +107,7 @@ def test_labels_of_slices_are_not_names_of_channels(tmp_path: Path, labels: list
 
 
 @pytest.mark.parametrize(
-    ("metadata", "told"),
+    ("metadata", "expected"),
     [
         ({"unit": "um"}, "found y 0.25 um, x 0.2 um, but none along z (ImageJ leaves out a depth"),
         ({"unit": "um"}, "--spacing-um z,0.25,0.2"),
@@ -117,12 +117,12 @@ def test_labels_of_slices_are_not_names_of_channels(tmp_path: Path, labels: list
     ],
 )
 def test_an_incomplete_spacing_of_imagej_is_reported(
-    tmp_path: Path, metadata: dict[str, Any], told: str
+    tmp_path: Path, metadata: dict[str, Any], expected: str
 ) -> None:
     path = tmp_path / "x.tif"
     metadata = {"axes": "ZYX", **metadata}
     tifffile.imwrite(path, counted("ZYX"), imagej=True, resolution=(5.0, 4.0), metadata=metadata)
-    assert told in refusal(path)
+    assert expected in refusal(path)
     assert read.open(path, spacing_um=GIVEN).levels[0].spacing_um == GIVEN
 
 
@@ -142,8 +142,8 @@ def test_a_stack_of_imagej_with_one_directory_is_read(tmp_path: Path) -> None:
     hold_voxels(dataset, stored, "TZCYX")
     content = path.read_bytes()
     path.write_bytes(content[:-7])
-    told = f"cut short at byte {len(content) - 7} of {len(content)} or more"
-    assert told in refusal(path, spacing_um=GIVEN)
+    expected = f"cut short at byte {len(content) - 7} of {len(content)} or more"
+    assert expected in refusal(path, spacing_um=GIVEN)
 
 
 @pytest.mark.parametrize("bigtiff", [False, True])
@@ -181,19 +181,19 @@ def test_axes_that_tifffile_writes_are_read(tmp_path: Path, axes: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("shape", "told"),
+    ("shape", "expected"),
     [
         ((20, 3, 12, 14), "20 slices along z of 3 channels"),
         ((3, 20, 12, 14), "3 channels of 20 slices along z"),
     ],
 )
 def test_two_unknown_axes_are_planes_and_few_channels(
-    tmp_path: Path, shape: tuple[int, ...], told: str
+    tmp_path: Path, shape: tuple[int, ...], expected: str
 ) -> None:
     stored = np.arange(np.prod(shape), dtype=np.uint16).reshape(shape)
     tifffile.imwrite(tmp_path / "x.tif", stored, photometric="minisblack")
     dataset = read.open(tmp_path / "x.tif", spacing_um=GIVEN)
-    assert dataset.notes == (f"the file doesn't state what its pages are: read as {told}",)
+    assert dataset.notes == (f"the file doesn't state what its pages are: read as {expected}",)
     hold_voxels(dataset, stored, "ZCYX" if shape[1] == 3 else "CZYX")
 
 
@@ -272,13 +272,13 @@ def test_metamorph_stk_is_read(tmp_path: Path, suffix: str) -> None:
 
 
 def test_a_centimetre_of_the_tags_counts_and_a_printer_s_inch_does_not(tmp_path: Path) -> None:
-    for unit, told in (
+    for unit, expected in (
         ("CENTIMETER", "found y 0.25 um, x 0.2 um, but none along z"),
         ("INCH", "not found"),
     ):
         path = tmp_path / f"{unit}.tif"
         tifffile.imwrite(path, counted("ZYX"), resolution=(5e4, 4e4), resolutionunit=unit)
-        assert told in refusal(path)
+        assert expected in refusal(path)
 
 
 def test_a_larger_image_after_a_preview_is_read(tmp_path: Path) -> None:
@@ -345,7 +345,7 @@ def test_a_file_that_is_cut_short_is_reported_as_such(tmp_path: Path, kind: str)
 
 
 @pytest.mark.parametrize(
-    ("head", "told"),
+    ("head", "expected"),
     [
         (b"", "an empty file"),
         (b"<!DOCTYPE html><html>", "an HTML page"),
@@ -361,10 +361,10 @@ def test_a_file_that_is_cut_short_is_reported_as_such(tmp_path: Path, kind: str)
 )
 @pytest.mark.parametrize("name", ["x.tif", "x.ome.tif", "x.lsm", "x.stk", "x.zip"])
 def test_a_file_that_is_not_tiff_is_named_by_its_first_bytes(
-    tmp_path: Path, head: bytes, told: str, name: str
+    tmp_path: Path, head: bytes, expected: str, name: str
 ) -> None:
     (tmp_path / name).write_bytes(head)
-    assert f"found {told}" in refusal(tmp_path / name) or told in refusal(tmp_path / name)
+    assert f"found {expected}" in refusal(tmp_path / name) or expected in refusal(tmp_path / name)
 
 
 def test_broken_ome_xml_is_refused_with_a_description_of_the_pages(tmp_path: Path) -> None:
@@ -505,14 +505,14 @@ def test_planes_that_were_written_one_by_one_are_a_stack(tmp_path: Path, photome
 def test_a_companion_that_names_no_file_is_refused(tmp_path: Path) -> None:
     text = companion_set(tmp_path, counted("ZYX"), [f"x-Z{index}.ome.tiff" for index in range(5)])
     source = tmp_path / "y.companion.ome"
-    for spoilt, told in (
+    for content, expected in (
         (text.replace("x-Z0", "gone"), "FileName: found 'gone.ome.tiff'"),
         (text.replace("x-Z0", "../x-Z0"), "leads to"),
         (text[:200], "OME-XML:"),
         ("", "found an empty file (copy or download it again), expected OME-XML"),
     ):
-        source.write_text(spoilt)
-        assert told in refusal(source)
+        source.write_text(content)
+        assert expected in refusal(source)
 
 
 def test_a_file_at_an_address_is_read_or_reported_as_cut_short(

@@ -106,7 +106,7 @@ def test_planes_of_a_folder_are_turned_by_the_tag_orientation(
 
 
 @pytest.mark.parametrize(
-    ("function", "expected", "told"),
+    ("function", "expected", "reason"),
     [
         ({"cf": 0, "c0": -32768.0, "c1": 1.0, "vunit": "HU"}, BODY.astype(int) - 32768, "HU"),
         ({"cf": 0, "c0": 0.5, "c1": 0.25, "vunit": "OD"}, BODY * 0.25 + 0.5, "0.5 + 0.25"),
@@ -119,7 +119,7 @@ def test_planes_of_a_folder_are_turned_by_the_tag_orientation(
     ],
 )
 def test_a_calibration_of_imagej_is_applied(
-    tmp_path: Path, function: dict[str, Any], expected: Any, told: str
+    tmp_path: Path, function: dict[str, Any], expected: Any, reason: str
 ) -> None:
     path = tmp_path / "a.tif"
     tifffile.imwrite(
@@ -129,8 +129,8 @@ def test_a_calibration_of_imagej_is_applied(
     dataset = read.open(path)
     np.testing.assert_array_equal(read_voxels(path), expected)
     notes = [note for note in dataset.notes if "values:" in note]
-    assert len(notes) == bool(told)
-    assert all(told in note for note in notes)
+    assert len(notes) == bool(reason)
+    assert all(reason in note for note in notes)
 
 
 def test_a_negative_depth_of_imagej_is_a_depth(tmp_path: Path) -> None:
@@ -154,14 +154,16 @@ def test_pages_of_another_type_are_counted(tmp_path: Path) -> None:
 
 def test_labels_that_name_channels_among_the_slices_are_noted(tmp_path: Path) -> None:
     labels = [f"c:{c}/2 z:{z}/8 - a.nd2" for z in range(1, 9) for c in (1, 2)]
-    for given, is_told in ((labels, True), ([f"z:{z}/16" for z in range(16)], False)):
+    for given, is_reported in ((labels, True), ([f"z:{z}/16" for z in range(16)], False)):
         path = tmp_path / "a.tif"
         tifffile.imwrite(
             path, BODY, imagej=True, resolution=(4.0, 5.0),
             metadata={"axes": "ZYX", "spacing": 0.5, "unit": "um", "Labels": given},
         )  # fmt: skip
         notes = read.open(path).notes
-        assert any("the labels of the slices name 2 channels" in note for note in notes) == is_told
+        assert (
+            any("the labels of the slices name 2 channels" in note for note in notes) == is_reported
+        )
 
 
 def test_the_orientation_of_ome_tiff_is_noted_and_not_applied(tmp_path: Path) -> None:
@@ -171,7 +173,7 @@ def test_the_orientation_of_ome_tiff_is_noted_and_not_applied(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("depth", "values", "found", "told"),
+    ("depth", "values", "found", "expected"),
     [
         ("1.0", np.arange(16) * 0.6, 0.6, "PositionZ of the planes states 0.6 um"),
         ("", np.arange(16) * 0.6, 0.6, "0.6 um by the planes' PositionZ"),
@@ -184,12 +186,12 @@ def test_the_orientation_of_ome_tiff_is_noted_and_not_applied(tmp_path: Path) ->
     ],
 )
 def test_positions_of_planes_are_compared_with_the_depth(
-    tmp_path: Path, depth: str, values: Any, found: float, told: str
+    tmp_path: Path, depth: str, values: Any, found: float, expected: str
 ) -> None:
     path = write_ome(tmp_path / "a.ome.tif", BODY, depth=depth, planes=places(values))
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx((found, 0.2, 0.25))
-    assert any(told in note for note in dataset.notes)
+    assert any(expected in note for note in dataset.notes)
 
 
 @pytest.mark.parametrize(
@@ -242,14 +244,14 @@ ALTERNATELY = np.stack([BODY, OTHER], axis=1).reshape(32, 48, 36)
 
 
 @pytest.mark.parametrize(
-    ("stored", "told"), [(STACKS, "after another"), (ALTERNATELY, "alternately")]
+    ("stored", "expected"), [(STACKS, "after another"), (ALTERNATELY, "alternately")]
 )
-def test_angles_along_z_are_separate_images(tmp_path: Path, stored: Any, told: str) -> None:
+def test_angles_along_z_are_separate_images(tmp_path: Path, stored: Any, expected: str) -> None:
     path = write_ome(tmp_path / "a.ome.tif", stored, after=ANGLES)
     first = read.open(path)
     np.testing.assert_array_equal(read_voxels(path), BODY)
     np.testing.assert_array_equal(read_voxels(path, series=2), OTHER)
-    assert any("2 angles" in note and told in note for note in first.notes)
+    assert any("2 angles" in note and expected in note for note in first.notes)
     assert first.levels[0].spacing_um == pytest.approx(UM)
     listed = list_series(path)
     assert len(listed) == 2
@@ -303,9 +305,9 @@ def test_a_plain_tiff_is_one_series(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_voxels(path, series=1), BODY)
 
 
-@pytest.mark.parametrize(("unit", "is_told"), [("CENTIMETER", True), ("INCH", False)])
+@pytest.mark.parametrize(("unit", "is_reported"), [("CENTIMETER", True), ("INCH", False)])
 def test_the_resolution_in_the_tags_is_compared_with_the_ome_xml(
-    tmp_path: Path, unit: str, is_told: bool
+    tmp_path: Path, unit: str, is_reported: bool
 ) -> None:
     per_um = 1e4 if unit == "CENTIMETER" else 25400.0
     same = (per_um / 0.25, per_um / 0.2)  # pixels per cm along x and y
@@ -315,8 +317,8 @@ def test_the_resolution_in_the_tags_is_compared_with_the_ome_xml(
     path = write_ome(tmp_path / "b.ome.tif", BODY, resolution=half, resolutionunit=unit)
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx(UM)
-    told = "voxel spacing along y: PhysicalSize of the OME-XML states 0.2 um"
-    assert [note.startswith(told) for note in dataset.notes] == [True] * is_told
+    beginning = "voxel spacing along y: PhysicalSize of the OME-XML states 0.2 um"
+    assert [note.startswith(beginning) for note in dataset.notes] == [True] * is_reported
 
 
 def test_a_field_that_imagej_s_description_holds_twice_is_reported(tmp_path: Path) -> None:
@@ -333,7 +335,7 @@ def test_a_field_that_imagej_s_description_holds_twice_is_reported(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("z", "y", "x", "told"),
+    ("z", "y", "x", "expected"),
     [
         ("1", "0.5", "0.0005", "pixels 1000 times as long along y as along x"),
         ("1000", "0.5", "0.5", "slices 1e+03 um apart along z with pixels of 0.5 um"),
@@ -343,12 +345,12 @@ def test_a_field_that_imagej_s_description_holds_twice_is_reported(tmp_path: Pat
     ],
 )
 def test_voxels_far_longer_along_one_axis_are_questioned(
-    tmp_path: Path, z: str, y: str, x: str, told: str
+    tmp_path: Path, z: str, y: str, x: str, expected: str
 ) -> None:
     sizes = {f"PhysicalSize{axis}": float(um) for axis, um in zip("ZYX", (z, y, x), strict=True)}
     path = tmp_path / "a.ome.tif"
     tifffile.imwrite(path, BODY, metadata={"axes": "ZYX", **sizes})
     notes = read.open(path).notes
-    assert len(notes) == bool(told)
-    assert all(told in note and "is the unit of one of them wrong?" in note for note in notes)
+    assert len(notes) == bool(expected)
+    assert all(expected in note and "is the unit of one of them wrong?" in note for note in notes)
     assert read.open(path, spacing_um=UM).notes == ()

@@ -72,15 +72,15 @@ def test_voxels_outside_the_valid_range_are_not_measurements(
     assert any("by the valid range" in note for note in notes)
 
 
-@pytest.mark.parametrize(("dtype", "said"), [(np.int8, "true"), (np.uint16, "false")])
+@pytest.mark.parametrize(("dtype", "attribute"), [(np.int8, "true"), (np.uint16, "false")])
 def test_the_sign_of_integers_may_be_stated_beside_them(
-    tmp_path: Path, dtype: Any, said: str
+    tmp_path: Path, dtype: Any, attribute: str
 ) -> None:
     stored = RANDOM.integers(0, 256, (5, 6, 7)).astype(np.uint8).view(np.int8).astype(dtype)
-    voxels, notes = whole(write(tmp_path / "a.h5", stored, _Unsigned=said))
+    voxels, notes = whole(write(tmp_path / "a.h5", stored, _Unsigned=attribute))
     other = np.uint8 if dtype == np.int8 else np.int16
     np.testing.assert_array_equal(voxels, stored.view(other))
-    assert any(f"_Unsigned = '{said}'" in note for note in notes)
+    assert any(f"_Unsigned = '{attribute}'" in note for note in notes)
 
 
 def test_attributes_that_change_nothing_leave_the_stored_integers(tmp_path: Path) -> None:

@@ -28,22 +28,22 @@ NAMED = {
 }
 
 
-def write(path: Path, version: Any, lies: dict[str, str], says: dict[str, str]) -> Path:
+def write(path: Path, version: Any, stored: dict[str, str], stated: dict[str, str]) -> Path:
     """Write an OME-Zarr whose chunks have names of one form, and whose metadata state another."""
     write_ome_zarr(path, [BODY], version="0.4" if version == 2 else "0.5")
     shutil.rmtree(path / "0")
     array = zarr.create_array(
         path / "0", shape=BODY.shape, dtype="u2", chunks=(8, 16, 36), zarr_format=version,
-        chunk_key_encoding=lies,  # type: ignore[arg-type]
+        chunk_key_encoding=stored,  # type: ignore[arg-type]
     )  # fmt: skip
     array[:] = BODY
     file = path / "0" / (".zarray" if version == 2 else "zarr.json")
     about = json.loads(file.read_text("utf-8"))
     if version == 2:
-        about["dimension_separator"] = says["separator"]
+        about["dimension_separator"] = stated["separator"]
     else:
-        separator = {"separator": says["separator"]}
-        about["chunk_key_encoding"] = {"name": says["name"], "configuration": separator}
+        separator = {"separator": stated["separator"]}
+        about["chunk_key_encoding"] = {"name": stated["name"], "configuration": separator}
     file.write_text(json.dumps(about))
     return path
 
@@ -57,10 +57,10 @@ def voxels_of(path: Path | str) -> tuple[Any, tuple[str, ...]]:
 @pytest.mark.slow
 def test_chunks_are_read_by_the_names_of_their_files(tmp_path: Path, version: int) -> None:
     forms = NAMED[version]
-    for number, (lies, says) in enumerate((a, b) for a in forms for b in forms if a != b):
-        voxels, notes = voxels_of(write(tmp_path / f"{number}.zarr", version, lies, says))
+    for number, (stored, stated) in enumerate((a, b) for a in forms for b in forms if a != b):
+        voxels, notes = voxels_of(write(tmp_path / f"{number}.zarr", version, stored, stated))
         np.testing.assert_array_equal(voxels, BODY)
-        assert any("but the files are named like" in note for note in notes), (lies, says)
+        assert any("but the files are named like" in note for note in notes), (stored, stated)
     voxels, notes = voxels_of(write(tmp_path / "same.zarr", version, forms[0], forms[0]))
     np.testing.assert_array_equal(voxels, BODY)
     assert notes == ()
@@ -72,8 +72,8 @@ def test_chunks_in_a_zip_file_are_read_by_the_names_of_their_files(
     tmp_path: Path, version: int
 ) -> None:
     forms = NAMED[version]
-    for number, (lies, says) in enumerate((a, b) for a in forms for b in forms):
-        path = write(tmp_path / f"{number}.zarr", version, lies, says)
+    for number, (stored, stated) in enumerate((a, b) for a in forms for b in forms):
+        path = write(tmp_path / f"{number}.zarr", version, stored, stated)
         archive = tmp_path / f"{number}.ozx"
         with zipfile.ZipFile(archive, "w") as file:
             for member in sorted(path.rglob("*")):
@@ -81,7 +81,7 @@ def test_chunks_in_a_zip_file_are_read_by_the_names_of_their_files(
         voxels, notes = voxels_of(archive)
         np.testing.assert_array_equal(voxels, BODY)
         is_noted = any("but the files are named like" in note for note in notes)
-        assert is_noted is (lies != says), (lies, says)
+        assert is_noted is (stored != stated), (stored, stated)
 
 
 def test_chunks_under_both_names_are_all_read(tmp_path: Path) -> None:
@@ -103,8 +103,8 @@ def test_a_bare_array_is_read_by_the_names_of_its_files(tmp_path: Path) -> None:
 def test_chunks_are_read_by_their_names_at_an_address(
     tmp_path: Path, serve: Callable[[Path], Any]
 ) -> None:
-    for number, (lies, says) in enumerate(zip(NAMED[2], reversed(NAMED[2]), strict=True)):
-        path = write(tmp_path / f"{number}.zarr", 2, lies, says)
+    for number, (stored, stated) in enumerate(zip(NAMED[2], reversed(NAMED[2]), strict=True)):
+        path = write(tmp_path / f"{number}.zarr", 2, stored, stated)
         server = serve(tmp_path)
         voxels, _ = voxels_of(f"{server.url}/{path.name}")
         np.testing.assert_array_equal(voxels, BODY)
@@ -142,5 +142,5 @@ def test_chunks_that_a_shard_lacks_are_counted(
     assert "not stored" not in plan(path, tmp_path, capsys)
     array[4:8, 12:24, 24:36] = 3
     array[8:, :36, :24] = 3  # empties a shard, which zarr-python then deletes
-    told = plan(path, tmp_path, capsys)
-    assert "13 of 48 chunks of level 0 (27.08%) are not stored: they are read as 3" in told
+    printed = plan(path, tmp_path, capsys)
+    assert "13 of 48 chunks of level 0 (27.08%) are not stored: they are read as 3" in printed

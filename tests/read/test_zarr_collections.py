@@ -60,12 +60,14 @@ refusal = refusing(read.open)
 def test_a_plate_lists_its_wells_and_a_well_lists_its_images(tmp_path: Path, version: str) -> None:
     wells = [f"{row}/{column:02d}" for row in "ABC" for column in range(1, 5)]
     path = plate(tmp_path / "my plate's.zarr", version, wells)
-    told = refusal(path)
-    assert "a plate of 12 wells (A/01, A/02, A/03, A/04, B/01, B/02, B/03, B/04 and 4 more)" in told
-    assert told.endswith(f": open an image of a well by its path, such as {path}/A/01/0")
-    told = refusal(path / "A" / "01")
-    assert "found a well of 2 images (0, 1), expected the attribute `multiscales`" in told
-    assert told.endswith(f": open one by its path, such as {path}/A/01/0")
+    message = refusal(path)
+    assert (
+        "a plate of 12 wells (A/01, A/02, A/03, A/04, B/01, B/02, B/03, B/04 and 4 more)" in message
+    )
+    assert message.endswith(f": open an image of a well by its path, such as {path}/A/01/0")
+    message = refusal(path / "A" / "01")
+    assert "found a well of 2 images (0, 1), expected the attribute `multiscales`" in message
+    assert message.endswith(f": open one by its path, such as {path}/A/01/0")
     assert "found 2 groups (01, 02)" in refusal(path / "A")
     for field in (0, 1):
         dataset = read.open(path / "A" / "02" / str(field))
@@ -87,10 +89,10 @@ def test_a_container_lists_its_images_and_a_single_one_is_opened(
         for name in names:
             write_ome_zarr(path / name, [f_phantom()], version=version)
         if count > 1:
-            told = refusal(path)
+            message = refusal(path)
             held = f"found 3 images ({', '.join(names)}) in one container (bioformats2raw.layout)"
-            assert held in told
-            assert told.endswith(f"such as {path}/{names[0]}")
+            assert held in message
+            assert message.endswith(f"such as {path}/{names[0]}")
         dataset = read.open(path if count == 1 else path / names[2])
         assert np.array_equal(dataset.read(0, dataset.levels[0].box).voxels, f_phantom())
 
@@ -144,10 +146,10 @@ def test_a_label_image_stops_the_plan_unless_the_user_names_it_as_labels(
     path = labelled(tmp_path / "i.zarr", version, dtype) / "labels" / "cells"
     out = tmp_path / "out"
     assert main(["plan", str(path), "-o", str(out)]) == 2
-    told = capsys.readouterr().err.strip().splitlines()[-1]
-    assert told.startswith(f"stereocell: {path}: ")
-    assert "is a label map: found `image-label` in its attributes" in told
-    assert "--as intensity" in told
+    printed = capsys.readouterr().err.strip().splitlines()[-1]
+    assert printed.startswith(f"stereocell: {path}: ")
+    assert "is a label map: found `image-label` in its attributes" in printed
+    assert "--as intensity" in printed
     assert main(["plan", str(path), "-o", str(out), "--as", "intensity"]) == 0
 
 
@@ -180,10 +182,10 @@ def test_a_place_among_labels_counts_and_a_folder_with_that_name_does_not(
 def test_metadata_of_another_form_are_refused_in_one_short_line(
     tmp_path: Path, ome: dict[str, Any]
 ) -> None:
-    told = refusal(group(tmp_path / "g.zarr", "0.5", ome))
-    assert "expected the attribute `multiscales`" in told
-    assert told.isprintable()
-    assert len(told) < 600
+    message = refusal(group(tmp_path / "g.zarr", "0.5", ome))
+    assert "expected the attribute `multiscales`" in message
+    assert message.isprintable()
+    assert len(message) < 600
 
 
 @pytest.mark.parametrize("labels", [3, [3], [None], ["../../x"], ["x" * 5000], ["cells\n"] * 900])

@@ -138,9 +138,9 @@ def test_positions_beside_an_image_of_ome_zarr_are_compared_with_its_scale(tmp_p
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx(um)
     np.testing.assert_array_equal(whole(dataset), f_phantom())
-    told = "; ".join(dataset.notes)
-    assert "along z: scale states 0.5 um, the list of positions z states 1 um: scale is" in told
-    assert "positions of y beside the image descend" in told
+    joined = "; ".join(dataset.notes)
+    assert "along z: scale states 0.5 um, the list of positions z states 1 um: scale is" in joined
+    assert "positions of y beside the image descend" in joined
     write(tmp_path / "b.zarr")
     zarr.open_group(tmp_path / "b.zarr", mode="a").attrs["multiscales"] = [image]
     assert read.open(tmp_path / "b.zarr").notes == ()

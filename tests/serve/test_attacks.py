@@ -104,10 +104,10 @@ def test_a_viewers_pace_is_served_by_the_server_itself(out: Path) -> None:
                 for stream in streams:
                     stream.sendall(ask)
                 for stream in streams:
-                    said = b""
-                    while not is_answer(said):
-                        said += stream.recv(4096)
-                    assert said.startswith(b"HTTP/1.1 206 ")
+                    received = b""
+                    while not is_answer(received):
+                        received += stream.recv(4096)
+                    assert received.startswith(b"HTTP/1.1 206 ")
 
 
 def test_the_documented_limits_are_the_servers() -> None:
@@ -196,9 +196,9 @@ def test_a_signal_lets_transfers_end_and_nothing_begin(out: Path, kind: signal.S
         with pytest.raises(ConnectionError):
             socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S).recv(1)
         assert read_all(stream, for_s=1.5) == SLOW
-        told, faults = process.communicate(timeout=PATIENCE_S)
+        printed, faults = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, faults) == (0, "")
-    assert told == "finishing 1 transfer, at most 8 s; Ctrl+C again stops at once\n"
+    assert printed == "finishing 1 transfer, at most 8 s; Ctrl+C again stops at once\n"
 
 
 @pytest.mark.slow
@@ -223,8 +223,8 @@ def test_in_the_background_ctrl_c_is_not_its_own_and_sigterm_is(out: Path) -> No
             with begin_download(port) as stream:
                 assert read_all(stream, for_s=0.1) == SLOW
         os.kill(process.pid, signal.SIGTERM)
-        told, faults = process.communicate(timeout=PATIENCE_S)
-    assert (process.returncode, told, faults) == (0, "", "")
+        printed, faults = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, printed, faults) == (0, "", "")
 
 
 def test_a_transfer_that_takes_too_long_is_cut_off(

@@ -105,8 +105,8 @@ def test_a_view_of_all_brings_the_volume(port):
         found = t.client.trees[tree]
         assert done["reason"] == "complete"
         assert (done["bricks"], done["bytes"]) == (len(found.frames), t.client.brick_bytes)
-        assert done["bytes"] == found.table.brick_bytes == found.said["brick_bytes"]
-        assert done["bricks"] == found.said["bricks"]
+        assert done["bytes"] == found.table.brick_bytes == found.message["brick_bytes"]
+        assert done["bricks"] == found.message["bricks"]
         again = reconstruct(found.table, found.frames)
         differs = again != VOLUME
         assert VOLUME[differs].max(initial=0) <= found.table.threshold
@@ -256,10 +256,10 @@ def test_a_new_view_ends_the_one_before(port):
             t.look(id)
         while 3 not in t.client.done:
             t.step()
-        said = [(d["view"], d["reason"]) for d in t.client.said if d["type"] == "done"]
-        assert said == [(1, "cancelled"), (2, "cancelled"), (3, "complete")]
+        ends = [(d["view"], d["reason"]) for d in t.client.messages if d["type"] == "done"]
+        assert ends == [(1, "cancelled"), (2, "cancelled"), (3, "complete")]
         nodes = [node for _, _, node in t.client.order]
-        assert len(nodes) == len(set(nodes)) == t.client.trees[0].said["bricks"]
+        assert len(nodes) == len(set(nodes)) == t.client.trees[0].message["bricks"]
         views = [view for view, _, _ in t.client.order]
         assert views == sorted(views)
         assert sum(d["bytes"] for d in t.client.done.values()) == t.client.brick_bytes
@@ -310,8 +310,8 @@ def test_a_second_visit_costs_no_bytes(port):
         first = t.client
     with talk(port) as t:
         known = first.trees[tree]
-        t.tables = {known.said["table"]: bytes(known.raw)}
-        number = t.open(table=known.said["table"])
+        t.tables = {known.message["table"]: bytes(known.raw)}
+        number = t.open(table=known.message["table"])
         t.client.trees[number].frames = known.frames
         t.say(t.client.have(number))
         t.look()
@@ -348,7 +348,7 @@ def test_unknown_volumes_are_reported_and_the_connection_continues(port):
 
 def test_a_damaged_volume_is_logged_in_full_and_reported_without_folders(tmp_path, caplog):
     out = write_out(tmp_path / "out", VOLUME)
-    (out / "bundle/volumes/r0_c0/CD31.ktx2").write_bytes(b"spoilt")
+    (out / "bundle/volumes/r0_c0/CD31.ktx2").write_bytes(b"damaged")
     with serving(out) as server, talk(server.port) as t:
         t.say({"type": "open", "volumes": [CD31]})
         error = t.until("error")
@@ -450,6 +450,6 @@ def test_messages_of_the_server_fit_the_schema(port):
         t.until("error")
         t.look()
         t.until("done")
-        assert {m["type"] for m in t.client.said} == {"welcome", "tree", "error", "done"}
-        for message in t.client.said:
+        assert {m["type"] for m in t.client.messages} == {"welcome", "tree", "error", "done"}
+        for message in t.client.messages:
             validator.validate(message)

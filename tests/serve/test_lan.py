@@ -203,7 +203,7 @@ def test_nothing_that_is_written_tells_a_token_but_the_code(server, context, cap
 
 def test_the_terminal_explains_which_certificate_to_accept_and_why(server, capfd):
     server.invite()
-    said = " ".join(capfd.readouterr().out.split())
+    printed = " ".join(capfd.readouterr().out.split())
     for words in (
         "a token that lets in one device, once",
         "this program made it just now",  # hence the phone's warning
@@ -212,7 +212,7 @@ def test_the_terminal_explains_which_certificate_to_accept_and_why(server, capfd
         f"has this SHA-256 fingerprint: {server.fingerprint}",
         "If the fingerprint differs, somebody intercepts the connection: go back.",
     ):
-        assert words in said
+        assert words in printed
 
 
 def test_the_code_says_the_address():
@@ -268,10 +268,10 @@ def test_the_address_is_json_for_a_program_and_text_in_any_encoding_for_a_person
         shown = str(bundle).encode(encoding, "backslashreplace").decode(encoding)
         assert f" shows {shown}; Ctrl+C ends it" in line
     with serving_command([str(bundle.parent), "--json"], encoding) as process:
-        told = json.loads(process.stdout.readline())
-        assert told["bundle"] == str(bundle)
-        assert (told["bricks"], told["fingerprint"]) == (True, "")
-        assert urlopen(told["address"], timeout=30).status == 200
+        printed = json.loads(process.stdout.readline())
+        assert printed["bundle"] == str(bundle)
+        assert (printed["bricks"], printed["fingerprint"]) == (True, "")
+        assert urlopen(printed["address"], timeout=30).status == 200
 
 
 def test_each_invitation_is_printed_for_a_program(tmp_path, monkeypatch, capsys):
@@ -283,10 +283,10 @@ def test_each_invitation_is_printed_for_a_program(tmp_path, monkeypatch, capsys)
     server.invite()
     first = server.gate.token
     server.gate.exchange(first)
-    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert told[0]["fingerprint"] == server.fingerprint
+    printed = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert printed[0]["fingerprint"] == server.fingerprint
     tokens = (first, server.gate.token)
-    assert told[1:] == [{"invitation": f"{server.address}?token={token}"} for token in tokens]
+    assert printed[1:] == [{"invitation": f"{server.address}?token={token}"} for token in tokens]
     server._socket.close()
 
 

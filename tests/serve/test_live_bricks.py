@@ -243,7 +243,7 @@ def test_a_source_that_has_gone_is_one_error_for_each_volume(source: Path, tmp_p
     source.unlink()
     with serving(fine, root) as port:
         client = sent(port, "/bricks", [{"tile": tile, "channel": one} for tile, one in names])
-    assert [one["code"] for one in client.said if one["type"] == "error"] == ["damaged"] * 2
+    assert [one["code"] for one in client.messages if one["type"] == "error"] == ["damaged"] * 2
 
 
 def test_trees_that_have_left_are_made_again_while_they_are_looked_at(

@@ -138,7 +138,7 @@ def is_well(port):
         until(lambda: client.is_ready(0))
         stream.send(json.dumps(VALID[3] | {"texel_px": 0, "budget": 1 << 30}))
         until(lambda: 1 in client.done)
-    return len(client.trees[0].frames) == client.trees[0].said["bricks"]
+    return len(client.trees[0].frames) == client.trees[0].message["bricks"]
 
 
 def fate(port, message, hello):
@@ -208,10 +208,10 @@ def test_a_refused_client_reads_the_reason_even_if_it_goes_on_sending(port):
         for start in range(0, len(whole), 16384):
             stream.sendall(whole[start : start + 16384])
             time.sleep(0.02)  # by now the server has judged the first part
-        said = b""
+        received = b""
         while part := stream.recv(4096):
-            said += part
-        assert struct.unpack(">H", said[2:4]) == (1009,)
+            received += part
+        assert struct.unpack(">H", received[2:4]) == (1009,)
 
 
 def test_every_broken_frame_ends_its_connection_alone(port, capfd, caplog):

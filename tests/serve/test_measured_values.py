@@ -26,8 +26,8 @@ def counts() -> np.ndarray[Any, np.dtype[np.int16]]:
 def build(folder: Path, *flags: str) -> Path:
     """Build two tiles, to be changed by none of the tests."""
     source = write_ome_tiff(folder / "f.ome.tif", counts(), spacing=SPACING_UM, names=["F"])
-    told = ("--iso-value", "F=900", "--preset", "none", *flags)
-    assert make_assets(source, folder / "out", "2x1", "--workers", "0", plan=told) == 0
+    arguments = ("--iso-value", "F=900", "--preset", "none", *flags)
+    assert make_assets(source, folder / "out", "2x1", "--workers", "0", plan=arguments) == 0
     (folder / "out/bundle/index.html").write_text("<!doctype html>")
     return folder / "out"
 

@@ -285,8 +285,8 @@ def test_a_websocket_of_another_host_name_is_refused(port: int) -> None:
 def test_pages_of_other_sites_may_lead_here_and_no_more(
     port: int, site: str, mode: str, dest: str, status: int
 ) -> None:
-    said = {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": mode, "Sec-Fetch-Dest": dest}
-    assert ask(port, "/index.html", **said)[0].status == status
+    headers = {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": mode, "Sec-Fetch-Dest": dest}
+    assert ask(port, "/index.html", **headers)[0].status == status
 
 
 @pytest.fixture(scope="module")
@@ -297,14 +297,14 @@ def framed(bundle: Path) -> Iterator[int]:
 
 
 def test_a_page_that_is_allowed_may_hold_the_viewer_in_a_frame(framed: int) -> None:
-    said = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
-    page, _ = ask(framed, "/", **said, **{"Sec-Fetch-Dest": "iframe"})
+    fetch_headers = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
+    page, _ = ask(framed, "/", **fetch_headers, **{"Sec-Fetch-Dest": "iframe"})
     policy = page.headers["Content-Security-Policy"]
     assert page.status == 200
     assert "frame-ancestors https://lab.example;" in policy
     data, _ = ask(framed, "/lod0.glb")
     assert "frame-ancestors 'none'" in data.headers["Content-Security-Policy"]
-    image, _ = ask(framed, "/lod0.glb", **said, **{"Sec-Fetch-Dest": "image"})
+    image, _ = ask(framed, "/lod0.glb", **fetch_headers, **{"Sec-Fetch-Dest": "image"})
     assert image.status == 403
 
 

@@ -93,10 +93,10 @@ def test_a_copy_with_defects_after_simplification_stays_unsimplified(
     distance: NDArray[np.float32], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def spoil(mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float) -> Simplified:
-        spoilt = Mesh(mesh.positions, mesh.triangles[1:], mesh.normals)
-        topology = find_topology(spoilt.triangles, len(spoilt.positions))
+        damaged = Mesh(mesh.positions, mesh.triangles[1:], mesh.normals)
+        topology = find_topology(damaged.triangles, len(damaged.positions))
         everywhere = np.ones(len(mesh.positions), bool)
-        return Simplified(spoilt, topology, np.flatnonzero(everywhere), everywhere, 0, 0)
+        return Simplified(damaged, topology, np.flatnonzero(everywhere), everywhere, 0, 0)
 
     simple = close(distance, REGION)
     monkeypatch.setattr(closed_copy, "simplify_without_defects", spoil)

@@ -11,7 +11,7 @@ import pytest
 
 from stereocell.cli.__main__ import main
 from stereocell.engine.step import Keyed
-from stereocell.model.object_table import ObjectTable, SharedWalls
+from stereocell.model.object_table import ObjectTable, SharedInterfaces
 from stereocell.steps.learn_tissue import LearnTissue
 from stereocell.tissue.classify import TissueOptions
 from stereocell.tissue.onnx_classifier import Network
@@ -105,7 +105,7 @@ def variants(value: Any) -> Iterator[tuple[Path_, Any]]:
 def _others(value: Any) -> Iterator[tuple[Path_, Any]]:
     if isinstance(value, ObjectTable):
         yield (), replace(value, labels=np.append(value.labels, np.uint64(7)))
-    elif isinstance(value, SharedWalls):
+    elif isinstance(value, SharedInterfaces):
         yield (), replace(value, area_um2=np.append(value.area_um2, 1.0))
     elif is_dataclass(value) and fields(value):
         yield from variants(value)

@@ -221,9 +221,9 @@ def test_an_interrupted_command_leaves_finished_files_and_no_partial_ones(
         time.sleep(0.02)
     halves = {file.name for file in out.glob(".*")}
     command.send_signal(number)
-    _, said = command.communicate(timeout=PATIENCE_S)
-    assert len(halves) == 5, said  # a file and a folder of each worker, and the lock
-    assert "KeyboardInterrupt" in said or "Terminated" in said
+    _, printed = command.communicate(timeout=PATIENCE_S)
+    assert len(halves) == 5, printed  # a file and a folder of each worker, and the lock
+    assert "KeyboardInterrupt" in printed or "Terminated" in printed
     assert {file.name for file in out.iterdir()} == {
         f"{name}.{ending}" for name in "ab" for ending in ("whole", "begun")
     }

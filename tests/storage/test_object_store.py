@@ -111,12 +111,12 @@ def test_an_input_written_during_a_build_is_reported_if_its_bytes_differ(
     out = tmp_path / "out"
     assert main(["plan", f"s3://{source}", "-o", str(out), "--grid", GRID]) == 0
     assert main(["units", str(out), "--workers", "0"]) == int(is_other)
-    said = capsys.readouterr().err
+    printed = capsys.readouterr().err
     words = f"changed while it was read: 1 of 10 files, the first is '{chunk}'"
-    assert (words in said) == is_other
+    assert (words in printed) == is_other
     assert bool(list(out.rglob("unit.json"))) != is_other
     if is_other:
-        assert "plan into another OUT" in said
+        assert "plan into another OUT" in printed
         assert main(["plan", f"s3://{source}", "-o", str(tmp_path / "2"), "--grid", GRID]) == 0
         assert main(["units", str(tmp_path / "2"), "--workers", "0"]) == 0
 

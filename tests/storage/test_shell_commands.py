@@ -51,8 +51,8 @@ def test_each_word_for_a_path_in_a_message_can_be_filled_in() -> None:
 
 def _pasted(capfd: pytest.CaptureFixture[str]) -> list[str]:
     """Return the words after `stereocell` of the one command that an error names."""
-    said = capfd.readouterr().err
-    (line,) = [line for line in said.splitlines() if line.startswith("stereocell: ")]
+    printed = capfd.readouterr().err
+    (line,) = [line for line in printed.splitlines() if line.startswith("stereocell: ")]
     (command,) = COMMAND.findall(line)
     return shlex.split(command)[1:]
 

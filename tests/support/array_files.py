@@ -171,3 +171,8 @@ def write_bdv_xml(folder: Path, container: str, unit: str) -> None:
         f'<ImageLoader format="bdv"><file type="relative">{container}</file></ImageLoader>'
         f"<ViewSetups>{setups}</ViewSetups></SequenceDescription></SpimData>"
     )
+
+
+def five(body: NDArray[Any]) -> NDArray[Any]:
+    """Return (t, c, z, y, x) with 2 times and 2 channels of a body, all different."""
+    return np.stack([np.stack([body + 10 * t + c for c in (0, 1)]) for t in (0, 1)])

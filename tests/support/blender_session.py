@@ -53,9 +53,9 @@ def run(step: str, folder: Path, **arguments: Any) -> Any:
         blender.cache_clear()  # the next step gets a new Blender
         pytest.fail(f"{step}: no end after 300 s")
     code = process.stdout.readline().strip()
-    said = Path(f"{result}.txt").read_text("utf-8")
-    assert code == "0", said[-3000:]
+    printed = Path(f"{result}.txt").read_text("utf-8")
+    assert code == "0", printed[-3000:]
     found = json.loads(result.read_text("utf-8"))
     # Blender prints the report of an operator like this
-    told = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", said, re.MULTILINE)
-    return {**found, "told": told} if step.startswith("edit") else found
+    messages = re.findall(r"^(Info|Warning): (\d+ edits: .*)$", printed, re.MULTILINE)
+    return {**found, "messages": messages} if step.startswith("edit") else found

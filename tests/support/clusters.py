@@ -96,9 +96,9 @@ def running_cluster(
 
 
 def _start(folder: Path, environment: Mapping[str, str], *words: str) -> subprocess.Popen[bytes]:
-    told = ["--scheduler-file", str(folder / "scheduler.json"), *_ON_LOOPBACK]
+    arguments = ["--scheduler-file", str(folder / "scheduler.json"), *_ON_LOOPBACK]
     return subprocess.Popen(
-        [sys.executable, "-m", "dask", *words, *told],
+        [sys.executable, "-m", "dask", *words, *arguments],
         cwd=folder,
         env=environment,
         start_new_session=True,

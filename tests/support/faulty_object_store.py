@@ -83,8 +83,8 @@ class _Proxy(BaseHTTPRequestHandler):
             self.close_connection = True
             return
         if fault in _CODES:
-            told = f"<Error><Code>{_CODES[fault]}</Code><Message>try again</Message></Error>"
-            self._answer(int(fault), [], told.encode())
+            error = f"<Error><Code>{_CODES[fault]}</Code><Message>try again</Message></Error>"
+            self._answer(int(fault), [], error.encode())
             return
         if fault == "slow":
             time.sleep(0.5)

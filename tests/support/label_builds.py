@@ -23,7 +23,7 @@ def build(source: Path, out: Path, *flags: object) -> None:
         assert run(phase, out, "--workers", 0) == 0
 
 
-def said(capsys: pytest.CaptureFixture[str]) -> str:
+def printed(capsys: pytest.CaptureFixture[str]) -> str:
     return "".join(capsys.readouterr())
 
 

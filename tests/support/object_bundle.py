@@ -144,15 +144,15 @@ def make_table(is_wide: bool = False, has_organs: bool = False) -> ObjectTable:
     if has_organs:
         named = tuple(f"organ {i + 1}" for i in range(117))
         columns = (*columns[:-1], replace(columns[-1], categories=named, colors=()))
-    walls = [(row, row + 1) for row in range(beam) if row % GRID[0] < GRID[0] - 1]
+    interfaces = [(row, row + 1) for row in range(beam) if row % GRID[0] < GRID[0] - 1]
     return ObjectTable(
         labels,
         boxes.astype(np.float32),
         tiles,
         columns,
         default="cell_type",
-        walls=np.array(walls, np.int32),
-        wall_um2=np.arange(1, len(walls) + 1, dtype=np.float32),
+        interfaces=np.array(interfaces, np.int32),
+        interface_um2=np.arange(1, len(interfaces) + 1, dtype=np.float32),
     )
 
 

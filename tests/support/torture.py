@@ -224,28 +224,28 @@ class Torture:
     def _own_workers(self) -> list[str]:
         return ["--workers", str(self.workers)]
 
-    def _start(self, told: list[str]) -> subprocess.Popen[bytes]:
+    def _start(self, arguments: list[str]) -> subprocess.Popen[bytes]:
         out = ["-o", self.place.address]
         self._was = self.place.find().get(SURVEY)
-        with self._said.open("wb") as said:
+        with self._said.open("wb") as printed:
             return subprocess.Popen(
-                [*STEREOCELL, "build", str(self._source), *out, "--grid", "2x1", *told],
+                [*STEREOCELL, "build", str(self._source), *out, "--grid", "2x1", *arguments],
                 env={**os.environ, **self.place.environment},
                 start_new_session=True,
                 stdout=subprocess.DEVNULL,
-                stderr=said,
+                stderr=printed,
             )
 
     def _phase_of(self, build: subprocess.Popen[bytes]) -> str:
         """Return the phase of the running build, by its lines and files; empty: none."""
-        said = self._said.read_text(errors="replace")
+        printed = self._said.read_text(errors="replace")
         for done, phase in (("bundle", "report"), ("stage", "bundle"), ("units", "stage")):
-            if re.search(rf"^{done}: (\d+\.\d s|up to date)$", said, re.MULTILINE):
+            if re.search(rf"^{done}: (\d+\.\d s|up to date)$", printed, re.MULTILINE):
                 return phase if build.poll() is None else ""
         now = self.place.find()
         if build.poll() is not None or LOCK not in now:
             return ""
-        if not re.search(r"^plan: (\d+\.\d s|up to date)$", said, re.MULTILINE):
+        if not re.search(r"^plan: (\d+\.\d s|up to date)$", printed, re.MULTILINE):
             return "plan"
         return "survey" if now.get(SURVEY) == self._was else "units"
 
@@ -259,8 +259,8 @@ class Torture:
 
     def _require_ended(self, build: subprocess.Popen[bytes]) -> None:
         if build.returncode:
-            said = self._said.read_text("utf-8")
-            raise TortureError(f"the build that went on ended with {build.returncode}: {said}")
+            printed = self._said.read_text("utf-8")
+            raise TortureError(f"the build that went on ended with {build.returncode}: {printed}")
         self._require_whole()
 
     def _require_whole(self) -> None:

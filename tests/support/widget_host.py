@@ -37,18 +37,18 @@ def main() -> None:
 
     viewer = stereocell.show(sys.argv[1], height=240)  # pixels; small, as software draws it
     for line in sys.stdin:
-        told = json.loads(line)
-        if "run" in told:
-            exec(told["run"], {"viewer": viewer})
-        elif "ask" in told:
+        request = json.loads(line)
+        if "run" in request:
+            exec(request["run"], {"viewer": viewer})
+        elif "ask" in request:
             try:
-                answer = {"answer": eval(told["ask"], {"viewer": viewer})}
+                answer = {"answer": eval(request["ask"], {"viewer": viewer})}
             except (KeyError, NameError, TypeError) as fault:
                 answer = {"fault": repr(fault)}
             print(json.dumps(answer), flush=True)
         else:
-            buffers = [memoryview(base64.b64decode(one)) for one in told["buffers"]]
-            viewer.comm.handle_msg({"content": {"data": told["data"]}, "buffers": buffers})
+            buffers = [memoryview(base64.b64decode(one)) for one in request["buffers"]]
+            viewer.comm.handle_msg({"content": {"data": request["data"]}, "buffers": buffers})
 
 
 if __name__ == "__main__":

@@ -27,9 +27,9 @@ def test_build_does_what_the_command_does(
     capsys.readouterr()
     command = ["build", str(source), "-o", str(tmp_path / "a"), "--grid", "2x1", "--workers", "0"]
     assert main(command) == 0
-    told = capsys.readouterr().err
+    printed = capsys.readouterr().err
     for phase in ("plan", "units", "stage", "bundle", "report"):
-        assert f"{phase}: up to date" in told  # the command finds nothing left to do
+        assert f"{phase}: up to date" in printed  # the command finds nothing left to do
 
 
 def test_wrong_arguments_raise_an_error_of_one_line(tmp_path: Path) -> None:

@@ -118,8 +118,8 @@ def test_number_of_workers_does_not_change_the_bytes(
     built: Path, tmp_path: Path, workers: str
 ) -> None:
     # One command shares workers between phases, because starting them takes longest.
-    told = ["-o", str(tmp_path / "out"), "--grid", "2x1", "--workers", workers]
-    assert main(["build", str(_source(tmp_path)), *told]) == 0
+    arguments = ["-o", str(tmp_path / "out"), "--grid", "2x1", "--workers", workers]
+    assert main(["build", str(_source(tmp_path)), *arguments]) == 0
     assert asset_digests(tmp_path / "out") == asset_digests(built)
 
 
@@ -185,7 +185,7 @@ def test_given_iso_value_is_in_units_of_the_source_voxels(tmp_path: Path) -> Non
     # A level that the user gives has no confidence, but its alternatives are listed.
     assert iso["confidence"] is None
     assert channel["appearance"]["surface"] == "clear"
-    assert channel["ladder"]
+    assert channel["levels"]
 
 
 # --- bad input: one line, exit code, nothing half-written
@@ -258,8 +258,8 @@ def test_nan_outside_the_field_of_view_counts_as_the_darkest_value(
     ):
         source = phantoms.write_ome_tiff(tmp_path / f"{name}.ome.tif", voxels)
         assert main(["build", str(source), "-o", str(tmp_path / name), "--workers", "0"]) == 0
-        told = " ".join(capsys.readouterr().err.split())
-        assert ("of the voxels are NaN or infinite: read as the smallest" in told) == (
+        printed = " ".join(capsys.readouterr().err.split())
+        assert ("of the voxels are NaN or infinite: read as the smallest" in printed) == (
             name == "gaps"
         )
     levels = [

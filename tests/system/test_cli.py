@@ -162,16 +162,16 @@ def test_json_flag_prints_json(
     assert main(["settings", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["plan"]["grid"] == ""
     assert main(["plan", str(tmp_path / "none.tif"), "-o", out, "--json"]) == 1
-    told = capsys.readouterr()
-    answer = json.loads(told.out)
+    printed = capsys.readouterr()
+    answer = json.loads(printed.out)
     assert answer["exit_code"] == 1
-    assert told.err == f"stereocell: {answer['error']}\n"
+    assert printed.err == f"stereocell: {answer['error']}\n"
     assert main(["plan", str(source), "-o", out, "--level", "9", "--json"]) == 2
     assert json.loads(capsys.readouterr().out)["exit_code"] == 2
     assert main(["plan", "--nonsense", "--json"]) == 2
-    told = capsys.readouterr()
-    assert json.loads(told.out)["exit_code"] == 2
-    (line,) = told.err.splitlines()
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["exit_code"] == 2
+    (line,) = printed.err.splitlines()
     assert line.startswith("stereocell: the following arguments are required: input")
     assert "`stereocell plan --help`" in line
 
@@ -182,19 +182,19 @@ def test_without_a_terminal_progress_is_one_plain_line_per_unit(
     out = str(tmp_path / "out")
     assert main(["plan", str(source), "-o", out, "--grid", "2x1"]) == 0
     command = [sys.executable, "-m", "stereocell.cli", "units", out, "--workers", "0"]
-    told = subprocess.run(command, capture_output=True, text=True, check=True)
-    lines = told.stderr.splitlines()
+    printed = subprocess.run(command, capture_output=True, text=True, check=True)
+    lines = printed.stderr.splitlines()
     assert "units: 1/4 r0_c0/F body" in lines
     assert "units: 4/4 r0_c1/F again" in lines
-    assert "\x1b" not in told.stderr
-    assert told.stdout == ""
+    assert "\x1b" not in printed.stderr
+    assert printed.stdout == ""
 
 
 def test_help_lists_the_exit_codes(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["--help"])
-    told = capsys.readouterr().out
-    assert all(f"\n  {code:<5}" in told for code in ("0", "1", "2", "130", "141", "143"))
+    printed = capsys.readouterr().out
+    assert all(f"\n  {code:<5}" in printed for code in ("0", "1", "2", "130", "141", "143"))
 
 
 def test_no_color_turns_colours_off() -> None:
@@ -208,16 +208,16 @@ def test_no_color_turns_colours_off() -> None:
         kept = {key: value for key, value in os.environ.items() if key != "NO_COLOR"}
         terminal = {"FORCE_COLOR": "1", "TERM": "xterm-256color", **given}
         command = [sys.executable, "-c", progress]
-        told = subprocess.run(command, env={**kept, **terminal}, capture_output=True, check=True)
-        assert b"1 failed" in told.stderr
-        return re.findall(r"\x1b\[[\d;]+m", told.stderr.decode())
+        printed = subprocess.run(command, env={**kept, **terminal}, capture_output=True, check=True)
+        assert b"1 failed" in printed.stderr
+        return re.findall(r"\x1b\[[\d;]+m", printed.stderr.decode())
 
     assert "\x1b[31m" in colours()
     assert colours(NO_COLOR="1") == []
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("arguments", "code", "expected"),
     [
         (["settings"], 141, ""),
         (["settings", "--json"], 141, ""),
@@ -226,7 +226,7 @@ def test_no_color_turns_colours_off() -> None:
     ],
 )
 def test_closed_pipe_is_not_an_error(
-    arguments: list[str], code: int, told: str, tmp_path: Path
+    arguments: list[str], code: int, expected: str, tmp_path: Path
 ) -> None:
     plain_bundle.write(tmp_path, plain_bundle.FILES)
     arguments = [str(tmp_path / "bundle") if word == "BUNDLE" else word for word in arguments]
@@ -236,8 +236,8 @@ def test_closed_pipe_is_not_an_error(
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True)
     os.close(writer)
     assert done.returncode == code
-    assert done.stderr.startswith(told)
-    assert len(done.stderr.splitlines()) == bool(told)
+    assert done.stderr.startswith(expected)
+    assert len(done.stderr.splitlines()) == bool(expected)
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")

@@ -87,12 +87,12 @@ def test_the_services_of_compose_are_commands_that_exist() -> None:
     assert services["worker"]["deploy"]["replicas"] == 2
     for name in ("scheduler", "worker"):
         program, command, *words = services[name]["entrypoint"]
-        told = subprocess.run(
+        printed = subprocess.run(
             [sys.executable, "-m", program, command, "--help"],
             capture_output=True, text=True, check=True,
         ).stdout  # fmt: skip
         for flag in (word for word in words if word.startswith("--")):
-            assert re.search(rf"{flag}\b", told), f"dask {command}: {flag}"
+            assert re.search(rf"{flag}\b", printed), f"dask {command}: {flag}"
     # A program that reaches the scheduler can run code in the workers, so no port is published.
     assert all("ports" not in service for service in services.values())
     # All services see the store and the input under the same names.

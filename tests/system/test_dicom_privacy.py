@@ -170,9 +170,9 @@ def test_no_identity_is_in_results_of_other_kinds_of_file(
     assert main(["slices", source, "-o", str(out / "slices")]) == 0
     if write is not packed_nifti:
         assert main(["plan", source, "-o", str(out), "--series", "list"]) == 0
-    told = capfd.readouterr()
-    assert (write is packed_nifti) == ("NaN" in told.out + told.err)
-    texts = {"stdout": told.out, "stderr": told.err, "log": caplog.text}
+    printed = capfd.readouterr()
+    assert (write is packed_nifti) == ("NaN" in printed.out + printed.err)
+    texts = {"stdout": printed.out, "stderr": printed.err, "log": caplog.text}
     assert identity_search.find(out, WORDS, texts) == []
     assert {hit.split(" ")[0] for hit in identity_search.find(folder, WORDS)} == set(WORDS)
 
@@ -194,9 +194,9 @@ def test_no_identity_is_in_any_byte_of_a_build(
     for tile, channel in library.volumes():
         library.open(tile, channel)
     assert list((out / "bricks").iterdir())
-    told = capfd.readouterr()
-    texts = {"stdout": told.out, "stderr": told.err, "log": caplog.text}
-    assert "MR, coronal" in told.out
+    printed = capfd.readouterr()
+    texts = {"stdout": printed.out, "stderr": printed.err, "log": caplog.text}
+    assert "MR, coronal" in printed.out
     assert identity_search.find(out, WORDS, texts) == []
     assert sum(file.stat().st_size for file in out.rglob("*") if file.is_file()) > 100_000
     # The same search finds all words in the source.
@@ -231,8 +231,8 @@ def test_no_identity_of_a_segmentation_is_in_the_results_of_its_objects(
         assert main([*phase, "-o", str(out)] if phase[0] == "plan" else [*phase, str(out)]) == 0
     table = (out / "bundle/channels/labels/objects.json").read_text("utf-8")
     assert "Segment 2" in table
-    told = capfd.readouterr()
-    texts = {"stdout": told.out, "stderr": told.err, "log": caplog.text}
+    printed = capfd.readouterr()
+    texts = {"stdout": printed.out, "stderr": printed.err, "log": caplog.text}
     assert identity_search.find(out, WORDS, texts) == []
     assert {hit.split(" ")[0] for hit in identity_search.find(folder, WORDS)} == set(WORDS)
 
@@ -344,17 +344,17 @@ def test_messages_about_damaged_files_contain_no_identity(
     files = sorted((tmp_path / "s").rglob("*.dcm"))
     for file in files[:1] if share == "one" else files:
         spoil(file)
-    told = ""
+    shown = ""
     try:
         dataset = read.open(tmp_path / "s")
-        told = repr((dataset.name, dataset.modality, dataset.channels, dataset.notes))
+        shown = repr((dataset.name, dataset.modality, dataset.channels, dataset.notes))
         dataset.read(0, dataset.levels[0].box)
     except SourceError as error:
-        told += f"{error} {error.__cause__!r}"
+        shown += f"{error} {error.__cause__!r}"
     out, err = capfd.readouterr()
-    assert told
+    assert shown
     assert (
-        identity_search.find(tmp_path / "none", WORDS, {"told": told + out + err + caplog.text})
+        identity_search.find(tmp_path / "none", WORDS, {"printed": shown + out + err + caplog.text})
         == []
     )
 
@@ -366,5 +366,5 @@ def test_texts_and_name_of_a_nifti_file_are_not_copied(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     nibabel.save(nifti, tmp_path / "in" / f"{TEXT}.nii")
     dataset = read.open(tmp_path / "in" / f"{TEXT}.nii")
-    told = repr((dataset.name, dataset.modality, dataset.channels, dataset.notes))
-    assert TEXT not in told
+    shown = repr((dataset.name, dataset.modality, dataset.channels, dataset.notes))
+    assert TEXT not in shown

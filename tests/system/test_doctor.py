@@ -52,7 +52,7 @@ def test_missing_packages_are_named_without_a_traceback(tmp_path: Path) -> None:
     about = Path(str(metadata.distribution("stereocell")._path))  # type: ignore[attr-defined]
     shutil.copytree(about, tmp_path / about.name)
     code = Path(doctor.__file__).parents[2]
-    told = {}
+    outputs = {}
     for name in ("doctor", "settings", "plan"):
         command = [sys.executable, "-S", "-m", "stereocell.cli", name]
         ended = subprocess.run(
@@ -63,16 +63,16 @@ def test_missing_packages_are_named_without_a_traceback(tmp_path: Path) -> None:
             text=True,
         )
         assert ended.returncode == 1
-        told[name] = (ended.stdout, ended.stderr)
-    said, faults = told["doctor"]
+        outputs[name] = (ended.stdout, ended.stderr)
+    printed, faults = outputs["doctor"]
     assert faults == ""
-    (packages,) = [line for line in said.splitlines() if line.startswith("missing packages: ")]
+    (packages,) = [line for line in printed.splitlines() if line.startswith("missing packages: ")]
     assert {"numpy", "zarr", "usd-core", "vtk"} <= set(re.findall(r"[\w-]+", packages))
     for name in ("settings", "plan"):
         assert re.fullmatch(
             r"stereocell: the package \w+ is missing: install StereoCell again "
             r"\(`stereocell doctor` lists all missing packages\)\n",
-            told[name][1],
+            outputs[name][1],
         )
     assert not (tmp_path / "out").exists()
 
@@ -94,9 +94,9 @@ def test_missing_requirement_fails(
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("missing packages: zarr is ")
     assert ", expected >=99; no-such-package is missing: commands that need them fail" in lines[1]
-    told = "\n".join(lines)
-    assert "without memory: 1.0 GiB available: 0 workers" in told
-    assert "without disk: 3.0 GiB free in this folder: a large build may not fit" in told
+    joined = "\n".join(lines)
+    assert "without memory: 1.0 GiB available: 0 workers" in joined
+    assert "without disk: 3.0 GiB free in this folder: a large build may not fit" in joined
 
 
 def test_check_that_needs_a_missing_package_names_it(
@@ -109,9 +109,9 @@ def test_check_that_needs_a_missing_package_names_it(
 
     monkeypatch.setattr(doctor, "available_bytes", lacking)
     assert main(["doctor"]) == 0
-    told = capsys.readouterr().out
-    assert "without memory: No module named 'no_such_package'" in told
-    assert "without disk" in told or "ok      disk" in told
+    printed = capsys.readouterr().out
+    assert "without memory: No module named 'no_such_package'" in printed
+    assert "without disk" in printed or "ok      disk" in printed
 
 
 def test_removed_folder_does_not_end_the_checks(
@@ -121,9 +121,9 @@ def test_removed_folder_does_not_end_the_checks(
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
     assert main(["doctor"]) == 0
-    told = capsys.readouterr().out
-    assert "without disk: No such file or directory: can't be examined\n" in told
-    assert "GPU" in told
+    printed = capsys.readouterr().out
+    assert "without disk: No such file or directory: can't be examined\n" in printed
+    assert "GPU" in printed
 
 
 def test_browser_and_node_must_exist_and_be_new_enough(

@@ -80,8 +80,8 @@ def viewing(image: Image, out: Path) -> Iterator[str]:
     with subprocess.Popen(words, env=environment, stdout=pipe, stderr=pipe, text=True) as view:
         try:
             assert view.stdout is not None
-            address, _, told = view.stdout.readline().partition(" shows ")
-            assert told, view.communicate(timeout=30)[1]
+            address, _, printed = view.stdout.readline().partition(" shows ")
+            assert printed, view.communicate(timeout=30)[1]
             yield address.rstrip("/")
             view.send_signal(signal.SIGTERM)
             _, complaints = view.communicate(timeout=30)

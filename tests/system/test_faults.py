@@ -86,8 +86,8 @@ def test_source_that_vanishes_under_workers_is_named_and_units_are_made_after_it
     grid, away, out = "3x2", volume.with_name("away"), tmp_path / "out"
     assert make_assets(volume, tmp_path / "whole", grid, "--workers", "0") == 0
     command = [sys.executable, "-m", "stereocell.cli", "build", str(volume), "-o", str(out)]
-    told = ["--grid", grid, "--workers", "2"]
-    build = subprocess.Popen([*command, *told], stderr=subprocess.PIPE, text=True)
+    flags = ["--grid", grid, "--workers", "2"]
+    build = subprocess.Popen([*command, *flags], stderr=subprocess.PIPE, text=True)
     while build.poll() is None and not list(out.glob("units/r*/*/*/unit.json")):
         time.sleep(0.01)
     volume.rename(away)
@@ -204,9 +204,9 @@ def test_finished_tiles_of_stage_and_bundle_are_not_made_again(
         assert len(finished) >= 3  # a tile of the stage has a layer and two volumes
         capsys.readouterr()
         assert main([phase, str(out), "--workers", "0"]) == 0
-        (told,) = [one for one in capsys.readouterr().err.splitlines() if f"{phase}: 1/" in one]
-        assert told.startswith(f"{phase}: 1/1 r0_c")
-        assert tile.name not in told
+        (printed,) = [one for one in capsys.readouterr().err.splitlines() if f"{phase}: 1/" in one]
+        assert printed.startswith(f"{phase}: 1/1 r0_c")
+        assert tile.name not in printed
         final = tile if phase == "stage" else out / "bundle"
         for name, written in finished.items():
             if name.name != "tile.json":  # not part of the finished bundle
@@ -304,8 +304,8 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     with socket.create_server(("127.0.0.1", 0)) as server:
         host = f"127.0.0.1:{server.getsockname()[1]}"
         # These settings make a new file system; that of earlier tests keeps its endpoint.
-        told = {"anon": True, "config_kwargs": {"user_agent_extra": host}}
-        monkeypatch.setitem(fsspec.config.conf, "s3", told)
+        storage_options = {"anon": True, "config_kwargs": {"user_agent_extra": host}}
+        monkeypatch.setitem(fsspec.config.conf, "s3", storage_options)
         yield host
 
 
@@ -375,7 +375,7 @@ def test_a_web_host_may_be_slow_but_not_silent(
 
 
 def test_users_settings_of_web_clients_take_precedence(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = {"timeout": ClientTimeout(total=7), "trust_env": True}
-    monkeypatch.setitem(fsspec.config.conf, "http", {"client_kwargs": told})
+    client_options = {"timeout": ClientTimeout(total=7), "trust_env": True}
+    monkeypatch.setitem(fsspec.config.conf, "http", {"client_kwargs": client_options})
     options = Location.of("https://a/b.ome.zarr").storage_options["client_kwargs"]
-    assert options == {**told, "trace_configs": checks()}
+    assert options == {**client_options, "trace_configs": checks()}

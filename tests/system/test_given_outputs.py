@@ -66,10 +66,10 @@ def test_command_accepts_each_output_or_refuses_it_in_one_line(
         capfd.readouterr()
         words = [str(word) for word in arguments(path, tmp_path / f"new {number}")]
         found[name] = main(words)
-        said = capfd.readouterr().err
-        assert "Traceback" not in said
+        printed = capfd.readouterr().err
+        assert "Traceback" not in printed
         if found[name]:
-            (line,) = [line for line in said.splitlines() if line.startswith("stereocell: ")]
+            (line,) = [line for line in printed.splitlines() if line.startswith("stereocell: ")]
             assert str(path) in line
             assert "expected" in line or "run `stereocell" in line
     assert {name for name, code in found.items() if code == 0} == taken

@@ -123,10 +123,10 @@ def test_no_flipped_bit_of_a_unit_gets_into_the_stage(
     if name == "unit.json":  # each command reads it, and so notices the damage
         assert not is_whole(_unit(out))
     assert main(["stage", str(out), *FLAGS]) == 1
-    said = capfd.readouterr().err
-    assert f"{_unit(out) / name}: damaged" in said
-    assert f"remove {_unit(out)} and run `stereocell units {out}`" in said
-    assert "Traceback" not in said
+    printed = capfd.readouterr().err
+    assert f"{_unit(out) / name}: damaged" in printed
+    assert f"remove {_unit(out)} and run `stereocell units {out}`" in printed
+    assert "Traceback" not in printed
     shutil.rmtree(_unit(out))
     _go_on(out)
     assert _assets(out) == _assets(built)
@@ -176,9 +176,9 @@ def test_damaged_inputs_of_units_are_named_and_computed_again(
     capfd.readouterr()
     if name == "survey.json":
         assert main(["stage", str(out), *FLAGS]) == 1
-        said = capfd.readouterr().err
-        assert f"{file}: damaged or changed by hand: its content has SHA-256" in said
-        assert f"run `stereocell units {out}`" in said
+        printed = capfd.readouterr().err
+        assert f"{file}: damaged or changed by hand: its content has SHA-256" in printed
+        assert f"run `stereocell units {out}`" in printed
     _go_on(out)
     assert _assets(out) == _assets(built)
 
@@ -225,10 +225,10 @@ def test_no_flipped_bit_of_the_stage_gets_into_the_bundle(
     _flip(out / "stage" / name, silent=True)
     capfd.readouterr()
     assert main(["bundle", str(out), *FLAGS]) == 1
-    said = capfd.readouterr().err
-    assert f"{name}: damaged, not the bytes that files.json says: remove it and run" in said
-    assert f"`stereocell stage {out}`" in said
-    assert "Traceback" not in said
+    printed = capfd.readouterr().err
+    assert f"{name}: damaged, not the bytes that files.json says: remove it and run" in printed
+    assert f"`stereocell stage {out}`" in printed
+    assert "Traceback" not in printed
     assert not (out / "bundle").exists()
     (out / "stage" / name).unlink()
     _go_on(out)
@@ -288,8 +288,8 @@ def test_layer_edited_in_place_stays_and_is_called_edited_or_damaged(
     edited = file.read_bytes()
     capfd.readouterr()
     _go_on(out)
-    said = capfd.readouterr().err
-    assert f"{name}: changed since it was written: edited in place, or damaged: taken as" in said
+    printed = capfd.readouterr().err
+    assert f"{name}: changed since it was written: edited in place, or damaged: taken as" in printed
     assert file.read_bytes() == edited
     line = _line(out, "stage hashes")
     assert f"stage/{name}: changed since it was written: edited in place, or dam" in line.detail
@@ -312,8 +312,8 @@ def test_binary_layer_with_a_flipped_bit_gets_into_no_bundle_and_is_not_overwrit
     assert main(["stage", str(out), *FLAGS]) == 0
     capfd.readouterr()
     assert main(["bundle", str(out), *FLAGS]) == 1
-    said = capfd.readouterr().err
-    assert f"{both}: remove it and run `stereocell stage {out}`" in said
+    printed = capfd.readouterr().err
+    assert f"{both}: remove it and run `stereocell stage {out}`" in printed
     assert file.read_bytes() == flipped
     file.unlink()
     _go_on(out)

@@ -87,8 +87,8 @@ def calls(checkout: Path) -> list[list[str]]:
 
 
 def phases(source: str, out: str) -> list[list[str]]:
-    told = [[phase, "--workers=3", "--", out] for phase in ("units", "stage", "bundle")]
-    return [["plan", f"--out={out}", "--", source], *told, ["report", "--", out]]
+    later = [[phase, "--workers=3", "--", out] for phase in ("units", "stage", "bundle")]
+    return [["plan", f"--out={out}", "--", source], *later, ["report", "--", out]]
 
 
 @pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
@@ -146,9 +146,9 @@ def test_demo_passes_names_on_unchanged(checkout: Path, make: Make, name: str) -
         *("--grid", "1x1"),
     ]
     assert checked == ["check", "--deep", f"--workers={name}", "--", name]
-    told = made.stdout.splitlines()[-1] if "\n" not in name else ""
-    if told:
-        shown = told.partition("OUT=")[2]
+    printed = made.stdout.splitlines()[-1] if "\n" not in name else ""
+    if printed:
+        shown = printed.partition("OUT=")[2]
         echoed = subprocess.run(
             ["bash", "-c", f"printf %s {shown}"], capture_output=True, text=True, check=True
         )
@@ -202,7 +202,7 @@ def test_another_request_for_the_same_out_is_planned_again(checkout: Path, make:
 
 
 def test_impossible_variables_are_named_in_one_line(checkout: Path, make: Make) -> None:
-    for set_, told in (
+    for set_, expected in (
         ({"INPUT": "a", "ARGS": 'say "x'}, 'ARGS is say "x (No closing quotation), expected words'),
         ({}, "INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder"),
         ({"INPUT": "a", "OUT": ""}, "OUT is empty, expected OUT=folder"),
@@ -212,7 +212,7 @@ def test_impossible_variables_are_named_in_one_line(checkout: Path, make: Make) 
     ):
         refused = make("plan", **set_)
         assert refused.returncode == 2
-        assert told in refused.stderr
+        assert expected in refused.stderr
         assert calls(checkout) == []
     assert not (checkout / "pwned").exists()
 
@@ -243,9 +243,9 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
     def environment(version: str) -> str:
         (checkout / name).write_text(f"#!/bin/sh\necho {version}\n")
         (checkout / name).chmod(0o755)
-        told = make("--eval=told:; @echo $(VENV)", "told", PYTHON=f"./{name}")
-        assert (told.returncode, told.stderr) == (0, "")
-        return told.stdout.strip()
+        made = make("--eval=show:; @echo $(VENV)", "show", PYTHON=f"./{name}")
+        assert (made.returncode, made.stderr) == (0, "")
+        return made.stdout.strip()
 
     assert environment("3.13") == ".venv"  # no environment exists yet
     (checkout / ".venv" / "lib" / "python3.13").mkdir(parents=True)
@@ -254,8 +254,8 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
         ".venv-3.12",
         ".venv-3.9",
     ]
-    told = make("--eval=told:; @echo $(VENV)", "told", PYTHON="python3")
-    assert told.stdout.strip() == ".venv"  # the default takes any existing environment
+    made = make("--eval=show:; @echo $(VENV)", "show", PYTHON="python3")
+    assert made.stdout.strip() == ".venv"  # the default takes any existing environment
     for file in ("requirements.lock", "pyproject.toml"):
         (checkout / file).touch()
     refused = make("setup", PYTHON="./missing")
@@ -273,8 +273,8 @@ def test_the_newest_python_is_found_in_pyenv_or_reported_as_missing(
         (checkout / name).symlink_to(ROOT / name)
     set_: dict[str, Any] = {"NEWEST": "3.99", "environment": {"PYENV_ROOT": str(checkout)}}
     missing = make("test-newest", **set_)
-    told = "test-newest: skipped: python3.99 is not installed\n"
-    assert (missing.returncode, missing.stdout, missing.stderr) == (0, told, "")
+    expected = "test-newest: skipped: python3.99 is not installed\n"
+    assert (missing.returncode, missing.stdout, missing.stderr) == (0, expected, "")
     python = checkout / "versions" / "3.99.1" / "bin" / "python3.99"
     python.parent.mkdir(parents=True)
     python.write_text("#!/bin/sh\necho 3.99\n")

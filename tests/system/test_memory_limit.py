@@ -84,8 +84,8 @@ def test_each_kind_of_memory_error_is_reported_as_such(
         Engine(0).run("units", fail, [("a", 0)])
     monkeypatch.setattr(cli, "_run", fail)
     assert cli.main(["settings"]) == 1
-    told = capsys.readouterr().err.splitlines()[-1]
-    assert told == f"stereocell: {words}"
+    printed = capsys.readouterr().err.splitlines()[-1]
+    assert printed == f"stereocell: {words}"
 
 
 @pytest.mark.parametrize("error", ERRORS[1:6], ids=repr)

@@ -69,9 +69,9 @@ def test_other_settings_are_named_before_they_replace_results(
 ) -> None:
     plan = ["plan", str(builds / "f.ome.tif"), "-o", str(out), "--grid"]
     assert main([*plan, "2x1"]) == 0
-    said = capfd.readouterr().err
-    assert "plan: OUT holds a build of this input with other settings" in said
-    assert "plan.grid: '1x1', now '2x1'" in said
+    printed = capfd.readouterr().err
+    assert "plan: OUT holds a build of this input with other settings" in printed
+    assert "plan.grid: '1x1', now '2x1'" in printed
     assert main([*plan, "2x1"]) == 0
     assert "other settings" not in capfd.readouterr().err
 

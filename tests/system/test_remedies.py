@@ -100,27 +100,27 @@ def test_bundle_names_a_missing_or_damaged_file_of_the_stage(
 ) -> None:
     DAMAGES[damage](out / "stage" / name)
     assert main(["bundle", str(out), "--workers", "0"]) == 1
-    said = capfd.readouterr().err
+    printed = capfd.readouterr().err
     found = "missing" if damage == "lost" else "damaged, not the bytes that files.json says"
-    assert f"{out / 'stage' / name}: {found}: " in said
-    assert f"run `stereocell stage {out}`" in said
+    assert f"{out / 'stage' / name}: {found}: " in printed
+    assert f"run `stereocell stage {out}`" in printed
 
 
 # --- remedies
 
 
-def _follow(out: Path, told: list[str], *, damaged: Path, source: Path) -> None:
+def _follow(out: Path, lines: list[str], *, damaged: Path, source: Path) -> None:
     """Run the remedies that `check` prints, and nothing else."""
-    if any(re.search(r"remove (it|what is damaged)", line) for line in told):
+    if any(re.search(r"remove (it|what is damaged)", line) for line in lines):
         damaged.unlink(missing_ok=True)
-    named = {name for line in told for name in re.findall(r"stereocell (\w+) (?:OUT|INPUT)", line)}
+    named = {name for line in lines for name in re.findall(r"stereocell (\w+) (?:OUT|INPUT)", line)}
     for name in ("plan", "units", "stage", "bundle", "report"):
         if name in named:
             given = [str(source), "-o", str(out), "--grid", "1x1"]
             assert main([name, *(given if name == "plan" else [str(out)])]) == 0, name
 
 
-def _told(out: Path) -> list[str]:
+def _faults(out: Path) -> list[str]:
     return [line.detail for line in formats.check(out) if not line.ok]
 
 
@@ -146,11 +146,11 @@ def test_remedies_that_check_prints_repair_the_damage(
         out = shutil.copytree(built, tmp_path / "out")
         kind = list(DAMAGES)[(i + turn) % len(DAMAGES)]
         DAMAGES[kind](out / name)
-        told = _told(out)
-        if not told:
+        faults = _faults(out)
+        if not faults:
             unnoticed.append(name)
-        _follow(out, told, damaged=out / name, source=built.parent / SOURCE)
-        assert _told(out) == [], f"{name} {kind}: {told}"
+        _follow(out, faults, damaged=out / name, source=built.parent / SOURCE)
+        assert _faults(out) == [], f"{name} {kind}: {faults}"
         shutil.rmtree(out)
     # No result depends on these files: seconds of a unit, and tiles that need no work.
     kept = {"seconds.json", "stage.json", "exports.json"}
@@ -162,16 +162,16 @@ def test_damaged_record_of_the_phases_has_one_remedy(
     out: Path, built: Path, damage: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     DAMAGES[damage](OutFolder(out).phases_file)
-    told = _told(out)
-    assert {line.partition("run `")[2] for line in told} == {
+    faults = _faults(out)
+    assert {line.partition("run `")[2] for line in faults} == {
         "stereocell units OUT && stereocell stage OUT && stereocell bundle OUT && "
         "stereocell report OUT` again"
     }
     capfd.readouterr()
     assert main(["export", str(out), str(out.parent / "f.glb")]) == 1
     assert f"run `stereocell units {out} && stereocell stage {out} && " in capfd.readouterr().err
-    _follow(out, told, damaged=OutFolder(out).phases_file, source=built.parent / SOURCE)
-    assert _told(out) == []
+    _follow(out, faults, damaged=OutFolder(out).phases_file, source=built.parent / SOURCE)
+    assert _faults(out) == []
 
 
 @pytest.mark.parametrize("lost", [["manifest.json"], ["manifest.json", "files.json"]])

@@ -85,18 +85,18 @@ def test_a_change_of_any_file_of_a_build_is_found_by_check(built: Path, tmp_path
         out = shutil.copytree(built, tmp_path / f"out {len(changed)}")
         for name in changed:
             _change(out / name)
-        told = _faults(out)
-        assert {name for name in changed if Path(name).name not in told} == set()
+        faults = _faults(out)
+        assert {name for name in changed if Path(name).name not in faults} == set()
     assert _faults(built) == ""
 
 
 @pytest.mark.parametrize("name", RECORDS)
 def test_changed_record_is_named_with_what_was_found_and_expected(out: Path, name: str) -> None:
     _change(out / name)
-    told = _faults(out)
-    assert f"{out / name}: damaged or changed by hand: its content has SHA-256 " in told
-    assert ", expected " in told
-    assert "run `stereocell" in told
+    faults = _faults(out)
+    assert f"{out / name}: damaged or changed by hand: its content has SHA-256 " in faults
+    assert ", expected " in faults
+    assert "run `stereocell" in faults
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
@@ -161,19 +161,20 @@ def test_shown_hashes_differ_even_if_only_the_last_digit_of_the_seal_was_changed
     seal = re.findall(r"[0-9a-f]{64}", file.read_text("utf-8"))[-1]
     changed = seal[:-1] + ("0" if seal[-1] != "0" else "1")
     file.write_text(file.read_text("utf-8").replace(seal, changed))
-    told = _faults(out)
-    assert f"its content has SHA-256 {seal}, expected {changed}: run `stereocell units" in told or (
-        f"its content has SHA-256 {seal}, expected {changed}: remove it and run" in told
+    faults = _faults(out)
+    assert (
+        f"its content has SHA-256 {seal}, expected {changed}: run `stereocell units" in faults
+        or (f"its content has SHA-256 {seal}, expected {changed}: remove it and run" in faults)
     )
-    assert told.count("run `stereocell") == 1
+    assert faults.count("run `stereocell") == 1
 
 
 @pytest.mark.parametrize("name", ["units/plan.key", SETTINGS])
 def test_remedy_for_a_missing_record_does_not_ask_to_remove_it(out: Path, name: str) -> None:
     (out / name).unlink()
-    told = _faults(out)
-    assert f"{out / name} is missing: run `stereocell " in told
-    assert "remove" not in told
+    faults = _faults(out)
+    assert f"{out / name} is missing: run `stereocell " in faults
+    assert "remove" not in faults
 
 
 # --- one rule for writing and reading

@@ -35,10 +35,10 @@ def test_an_sdist_makes_the_same_wheel_without_node(tmp_path: Path) -> None:
     assert contents[0] == contents[1]
     assert "stereocell/viewer_gltf/dist/index.html" in contents[0]
 
-    told = Metadata.from_email((unpacked / "PKG-INFO").read_bytes(), validate=True)
-    assert told.license_expression == "Apache-2.0"
-    assert told.description_content_type == "text/markdown"
-    assert "Operating System :: POSIX :: Linux" in told.classifiers
+    metadata = Metadata.from_email((unpacked / "PKG-INFO").read_bytes(), validate=True)
+    assert metadata.license_expression == "Apache-2.0"
+    assert metadata.description_content_type == "text/markdown"
+    assert "Operating System :: POSIX :: Linux" in metadata.classifiers
 
 
 def test_wheel_is_not_built_without_the_viewer(tmp_path: Path) -> None:

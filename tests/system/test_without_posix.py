@@ -62,10 +62,10 @@ def test_commands_run_with_what_windows_has(tmp_path: Path) -> None:
         ["publish", "out", "site"],
         ["publish", "out", "site"],
     ) as process:
-        told, complaints = process.communicate(timeout=300)
-    assert process.returncode == 0, (told, complaints)
+        printed, complaints = process.communicate(timeout=300)
+    assert process.returncode == 0, (printed, complaints)
     assert (tmp_path / "site" / "manifest.json").is_file()
-    assert told.endswith("0 uploaded (0 bytes), 0 removed\n")
+    assert printed.endswith("0 uploaded (0 bytes), 0 removed\n")
 
     with (
         ctrl_c.heeded(),

@@ -96,5 +96,5 @@ def test_another_version_of_a_package_for_maps_makes_results_with_maps_again(
         assert main([phase, str(out), "--workers", "0"]) == 2
         assert capsys.readouterr().err.endswith("pip install 'stereocell[maps]'\n")
     assert main(["check", "--deep", "--workers", "0", str(out)]) == 1
-    told = capsys.readouterr()
-    assert "a surface with baked maps needs the package alktx2" in told.out + told.err
+    printed = capsys.readouterr()
+    assert "a surface with baked maps needs the package alktx2" in printed.out + printed.err

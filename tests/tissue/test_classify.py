@@ -90,8 +90,8 @@ def test_probabilities_are_calibrated(learned: tuple[HeadPhantom, Tissue]) -> No
         truth = head.labels[brain] == k
         bins = np.digitize(p, (0.1, 0.5, 0.9))
         counts = np.bincount(bins, minlength=4)
-        said, found = (np.bincount(bins, values, 4) / counts for values in (p, truth))
-        assert (np.abs(said - found) * counts).sum() / counts.sum() < 0.03
+        predicted, found = (np.bincount(bins, values, 4) / counts for values in (p, truth))
+        assert (np.abs(predicted - found) * counts).sum() / counts.sum() < 0.03
         assert (np.diff(found) > 0).all()
 
 

@@ -257,6 +257,6 @@ def test_a_build_is_first_path_traced_and_holds_nothing_about_the_patient(
     # Short digits, such as a time of day, occur in any number.
     words = [part for value in IDENTITY.values() for part in value.split("^") if len(part) > 6]
     captured = capfd.readouterr()
-    told = {"stdout": captured.out, "stderr": captured.err}
-    assert find(out, [*words, *uids], told) == []
+    outputs = {"stdout": captured.out, "stderr": captured.err}
+    assert find(out, [*words, *uids], outputs) == []
     assert find(series, words)  # the words are in the series, where they can be found

@@ -57,13 +57,13 @@ def found(counts: NDArray[np.float64]) -> Threshold:
 def valley(bells: list[tuple[float, float, float]], low: float, high: float) -> float:
     """Return the lowest point of a sum of normal curves after a moving mean of 25 bins."""
 
-    def meant(x: float) -> float:
+    def mean_of_bins(x: float) -> float:
         return sum(
             height * sigma * (norm.cdf((x + 12.5 - c) / sigma) - norm.cdf((x - 12.5 - c) / sigma))
             for c, sigma, height in bells
         )
 
-    return float(minimize_scalar(meant, bounds=(low, high), method="bounded").x)
+    return float(minimize_scalar(mean_of_bins, bounds=(low, high), method="bounded").x)
 
 
 @pytest.mark.parametrize("second", [20_000, 60_000])

@@ -172,9 +172,14 @@ def test_without_a_surface_there_is_no_level_and_no_threshold() -> None:
     assert statistics.threshold is not None
     unsure, none = (
         make_appearance(
-            "CD31", (0, 1, 0), statistics=statistics, level=level, confidence=0.3, why_unclear=doubt
+            "CD31",
+            (0, 1, 0),
+            statistics=statistics,
+            level=level,
+            confidence=0.3,
+            why_unclear=reason,
         )
-        for level, doubt in ((SurfaceLevel(120.0, None, 1.0), ""), (None, "no clear surface"))
+        for level, reason in ((SurfaceLevel(120.0, None, 1.0), ""), (None, "no clear surface"))
     )
     assert none.surface == "none"
     assert none.surface_reason == "no clear surface"

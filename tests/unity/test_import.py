@@ -125,7 +125,7 @@ def test_a_faulty_bundle_is_refused_in_one_line(run: Run, bundle: Path, tmp_path
     refuse("glb", flip(glb), glb, "SHA-256")
     refuse("gone", lambda folder: (folder / place).unlink(), place, "missing")
     refuse("cut", lambda folder: (folder / place).write_bytes(b"\xabKTX"), place, "size is 4 bytes")
-    refuse("newer", change("manifest.json", version=2), "version is 2; expected 1")
+    refuse("newer", change("manifest.json", version=2), "version is 2, expected 1")
     refuse("other", change("manifest.json", format="x"), "expected stereocell-bundle")
     refuse("json", lambda f: (f / "manifest.json").write_text("{"), "manifest.json")
     refuse("bare", change("manifest.json", tiles=None, specimen={}), "specimen.name")

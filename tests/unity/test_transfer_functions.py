@@ -84,7 +84,7 @@ def test_edits_of_the_window_reach_a_new_bundle(
         {"field": "Colour and opacity", "colors": [[0.5, 1.0, 0.0]]},
         {"field": "CD31", "value": False},
     )  # fmt: skip
-    assert str(layer) in found["said"]
+    assert str(layer) in found["message"]
     function = channel(bundle)["transfer_function"]
     expected = row_of(POINTS)
     row = channel(bundle)["transfer_functions"].index(function)
@@ -96,8 +96,8 @@ def test_edits_of_the_window_reach_a_new_bundle(
     assert np.array_equal(texels_of(found["imported"])[0, row], before[row])
 
     out = tmp_path / "out"
-    said = write(layer, out)
-    assert not [line for line in said if "not taken over" in line]
+    lines = write(layer, out)
+    assert not [line for line in lines if "not taken over" in line]
     after = channel(out)
     lut = decode_finest((out / after["lut"]["path"]).read_bytes())[0]
     assert np.array_equal(lut[row, :, 3], expected)
@@ -136,11 +136,11 @@ def test_no_layer_is_written_without_edits_or_over_the_stage(
     run: Run, bundle: Path, stage: Path, tmp_path: Path
 ) -> None:
     layer = tmp_path / "none.usda"
-    assert "Nothing was edited" in edited(run, bundle, stage, layer)["said"]
+    assert "Nothing was edited" in edited(run, bundle, stage, layer)["message"]
     assert not layer.exists()
     before = stage.read_bytes()
-    said = edited(run, bundle, stage, stage, {"field": "CD31", "value": False})["said"]
-    assert "is the stage itself" in said
+    message = edited(run, bundle, stage, stage, {"field": "CD31", "value": False})["message"]
+    assert "is the stage itself" in message
     assert stage.read_bytes() == before
 
 
@@ -151,8 +151,8 @@ def test_a_gradient_of_several_colours_is_refused_in_the_window(
     colors = [[1, 0, 0], [0, 0, 1]]
     found = edited(run, bundle, stage, layer, {"field": "Colour and opacity", "colors": colors})
     (line,) = (line for line in found["drawn"] if "several colours" in line)
-    assert line.startswith("CD31: found several colours; expected one")
-    assert "Nothing was edited" in found["said"]
+    assert line.startswith("CD31: found several colours, expected one")
+    assert "Nothing was edited" in found["message"]
 
 
 @pytest.mark.slow

@@ -136,9 +136,9 @@ def test_symbolic_link_out_of_the_stage_is_refused(
     assert bundle(out) == 1
     assert f"leads to {bait}, expected a file in {out}/stage" in capsys.readouterr().err
     assert main(["check", str(out)]) == 1
-    told = capsys.readouterr().out
-    assert told.count(f"leads to {bait}") == 2  # once for the stage, once for its files
-    assert "Traceback" not in told
+    printed = capsys.readouterr().out
+    assert printed.count(f"leads to {bait}") == 2  # once for the stage, once for its files
+    assert "Traceback" not in printed
 
 
 @pytest.mark.parametrize("name", ["tiles/r0_c0/tile.usdc", "tiles/r0_c0/Channel0.exr"])
@@ -161,9 +161,9 @@ def test_check_refuses_a_stage_that_leads_out(
     del stage
     for flags in ((), ("--deep", "--workers", "0")):
         assert main(["check", str(out), *flags]) == 1
-        told = capsys.readouterr().out
-        assert "'../../../other/stage.usda': leads to" in told
-    assert "FAIL files of the stage" in told
+        printed = capsys.readouterr().out
+        assert "'../../../other/stage.usda': leads to" in printed
+    assert "FAIL files of the stage" in printed
 
 
 def test_variables_in_paths_are_refused(out: Path) -> None:
@@ -218,9 +218,9 @@ def test_strict_bundle_fails_and_writes_nothing_if_an_edit_is_lost(
     command = ["bundle", str(out), "--workers", "0", "--stage", str(path)]
     capsys.readouterr()
     assert main([*command, "--strict"]) == 1
-    told = capsys.readouterr().err
-    assert "Channel0.inputs:colour is not taken over: no reader knows this name" in told
-    assert "found 1 edit that no bundle takes over, expected none with --strict" in told
+    printed = capsys.readouterr().err
+    assert "Channel0.inputs:colour is not taken over: no reader knows this name" in printed
+    assert "found 1 edit that no bundle takes over, expected none with --strict" in printed
     assert not (out / "bundle").exists()
     for _ in range(2):  # the second time the bundle is up to date
         assert main(command) == 0

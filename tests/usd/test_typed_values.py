@@ -53,7 +53,7 @@ def refusal_of_bundle(layer: Path, folder: Path) -> str:
 
 
 @pytest.mark.parametrize(
-    ("prim", "line", "told"),
+    ("prim", "line", "expected"),
     [
         (CHANNEL, 'string inputs:color = "red"', "inputs:color: found a value of type string"),
         (CHANNEL, "float inputs:color = 1", "inputs:color: found a value of type double"),
@@ -91,11 +91,11 @@ def refusal_of_bundle(layer: Path, folder: Path) -> str:
     ],
 )
 def test_a_bundle_refuses_a_value_of_another_type_in_one_line(
-    edited: Callable[[str, str], Path], tmp_path: Path, prim: str, line: str, told: str
+    edited: Callable[[str, str], Path], tmp_path: Path, prim: str, line: str, expected: str
 ) -> None:
     refusal = refusal_of_bundle(edited(prim, line), tmp_path)
     assert prim in refusal
-    assert told in refusal
+    assert expected in refusal
     assert "\n" not in refusal
 
 
@@ -147,11 +147,11 @@ def test_a_bundle_without_channels_is_refused(
     channels = stage.GetPrimAtPath("/Specimen/Channels").GetChildren()
     each = "\n".join(f'over "{prim.GetName()}" (active = false) {{}}' for prim in channels)
     none = edited("/Specimen/Channels", each)
-    told = f"{layer}: no channel is active below /Specimen/Channels, expected one or more"
-    assert refusal_of_bundle(none, tmp_path) == told
+    expected = f"{layer}: no channel is active below /Specimen/Channels, expected one or more"
+    assert refusal_of_bundle(none, tmp_path) == expected
     with pytest.raises(StereoCellError) as raised:
         export_stage(none, tmp_path / "s.glb", options=ExportOptions())
-    assert str(raised.value) == told
+    assert str(raised.value) == expected
 
 
 def test_usd_prints_no_warnings_of_its_own(

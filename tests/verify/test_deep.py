@@ -272,13 +272,13 @@ def test_a_build_agrees_with_its_source_and_its_bundle(
     built: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["check", str(built), "--deep", "--workers", "0"]) == 0
-    told = capsys.readouterr().out
-    assert "ok   F lod0 against source: 2 surfaces within " in told
+    printed = capsys.readouterr().out
+    assert "ok   F lod0 against source: 2 surfaces within " in printed
     assert (
         "ok   F against source: 2 units: surfaces as stated, volumes equal, also as measured"
-        in told
+        in printed
     )
-    assert "2 volumes, every voxel of every level" in told
+    assert "2 volumes, every voxel of every level" in printed
     found = lines_of(built)["F lod3 against source"].detail.split()
     within, stated = float(found[3]), float(found[5])
     assert 0 < within <= stated * 1.02
@@ -438,15 +438,15 @@ def test_a_bundle_of_another_layer_is_reported_as_different_from_the_stage(
     variants.SetVariantSelection(chosen)
     prim.CreateAttribute("inputs:colour", Sdf.ValueTypeNames.Color3f).Set((0, 1, 0))
     stage.GetRootLayer().Save()
-    told = ["--stage", str(layer)]
-    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    flags = ["--stage", str(layer)]
+    assert main(["bundle", str(out), *flags, "--workers", "0"]) == 0
     found = failures(out)
     assert found.keys() == {MANIFEST}
     assert "F: transfer_functions is ['default', 'mine'" in found[MANIFEST]
     remedy = f"; the bundle is of {layer.name}: check it with --stage LAYER"
     assert found[MANIFEST].endswith(remedy)
     capsys.readouterr()
-    assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
+    assert main(["check", str(out), "--deep", "--workers", "0", *flags]) == 0
     line = (
         "ok   edits of the stage: /Specimen/Channels/F.inputs:colour is not taken over: no reader"
     )
@@ -474,11 +474,11 @@ def test_a_bundle_of_an_edited_mesh_is_compared_with_the_edited_mesh(
     stage.GetRootLayer().subLayerPaths.append(str(out / "stage" / "stage.usda"))
     push_the_finest(stage)
     stage.GetRootLayer().Save()
-    told = ["--stage", str(layer)]
-    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    flags = ["--stage", str(layer)]
+    assert main(["bundle", str(out), *flags, "--workers", "0"]) == 0
     edit = "r0_c0/F: edited by hand: lod0 (sound); made anew from lod0: lod1 within "
     assert f"bundle: {edit}" in capsys.readouterr().err
-    assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
+    assert main(["check", str(out), "--deep", "--workers", "0", *flags]) == 0
     assert edit in capsys.readouterr().out
     assert "lod1: " in failures(out)[BUNDLE]  # against the stage as it was built
     # the bundle of the edit with the coarser levels and errors as they were is a fault
@@ -487,7 +487,7 @@ def test_a_bundle_of_an_edited_mesh_is_compared_with_the_edited_mesh(
     assert main(["bundle", str(out), "--workers", "0"]) == 0
     as_built = file.read_bytes()
     assert as_built != edited
-    assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
+    assert main(["bundle", str(out), *flags, "--workers", "0"]) == 0
     file.write_bytes(as_built)
     line = {line.name: line for line in check_deep(out, Engine(0), layer)}[BUNDLE]
     assert not line.ok

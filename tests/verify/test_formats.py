@@ -239,8 +239,8 @@ def test_lost_meshes_are_not_taken_for_a_build_without_any_surface(out):
     "path", ["tiles/r0_c0/CD31.vdb", "tiles/r0_c0/CD31.exr", "looks/CD31_default.exr"]
 )
 def test_cut_file_of_the_stage_is_found(out, path, capfd):
-    spoilt = out / "stage" / path
-    spoilt.write_bytes(spoilt.read_bytes()[:-20])
+    damaged = out / "stage" / path
+    damaged.write_bytes(damaged.read_bytes()[:-20])
     found = lines(out)
     assert "stage files" in failed(found)
     assert f"{path}: can't be read as" in found["stage files"].detail

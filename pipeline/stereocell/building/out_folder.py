@@ -209,10 +209,14 @@ class OutFolder:
     def _key(self, plan: Plan) -> str:
         return key_of(to_json(replace(self._without_place(plan), notes=())))
 
+    def _key_of_file(self) -> str:
+        """Return the key of plan.json as it was written, which an earlier version may have done."""
+        return key_of({**(find_sealed(self.plan_file, PLAN) or {}), "notes": []})
+
     def require_units_of(self, plan: Plan) -> None:
         """Raise OutputError unless all units of the plan are listed as built."""
         signed = find_sealed(self.units_plan_file, PLAN_KEY)
-        if signed is None or signed["key"] != self._key(plan):
+        if signed is None or signed["key"] not in (self._key(plan), self._key_of_file()):
             raise OutputError(
                 f"{self.out / 'units'}: not built for the plan in {self.plan_file.name}: "
                 f"{_RUN_UNITS}"

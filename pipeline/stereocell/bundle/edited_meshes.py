@@ -71,7 +71,7 @@ _DEFECTS = {
     "non_manifold_vertices": "pinched vertices",
     "inside_out": "bodies inside out",
     "crossings": "crossings",
-    "walls": "triangles in the cut",
+    "in_cut_plane": "triangles in the cut",
 }
 
 
@@ -159,7 +159,7 @@ def _follow(
     own = {lod.level for lod in lods[1:] if lod.level in edited and lod.shape != fine.shape}
     made = _make(tile, channel_id, lods, options, planes) if len(own) < len(lods) - 1 else {}
     result = [replace(fine, distance_um=0.0, largest_um=0.0)]
-    anew = []
+    remade = []
     for lod in lods[1:]:
         if lod.level in own:
             lod = measured(lod)
@@ -167,10 +167,10 @@ def _follow(
         else:
             lod, defects = made[lod.level]
             found = "" if not defects else f" with {defects} faults"
-            anew.append(f"lod{lod.level}{found} within {lod.distance_um:.3g} um")
+            remade.append(f"lod{lod.level}{found} within {lod.distance_um:.3g} um")
         result.append(lod)
-    if anew:
-        remarks.append(f"made anew from lod{fine.level}: {', '.join(anew)}")
+    if remade:
+        remarks.append(f"made anew from lod{fine.level}: {', '.join(remade)}")
     return result, remarks
 
 

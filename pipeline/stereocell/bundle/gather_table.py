@@ -40,7 +40,7 @@ def gather_table(
         tuple(replace(column, values=_values(own, column.id)[kept]) for column in columns),
         _names(own, kept),
         default,
-        *_walls(own, found, row),
+        *_interfaces(own, found, row),
     )
 
 
@@ -66,7 +66,7 @@ def _names(own: dict[str, PackedObjects], kept: NDArray[np.int64]) -> tuple[str,
     return tuple(names[place] for place in kept.tolist()) if names else ()
 
 
-def _walls(
+def _interfaces(
     own: dict[str, PackedObjects], found: NDArray[np.uint64], row: NDArray[np.int32]
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return pairs of rows (m, 2) whose objects share an interface, and its area (m,), um^2.
@@ -76,6 +76,6 @@ def _walls(
     pairs = np.concatenate([np.frombuffer(o.touching, "<u8") for o in own.values()]).reshape(-1, 2)
     at = np.searchsorted(found, pairs).clip(0, len(found) - 1)
     known = (found[at] == pairs).all(axis=1)
-    areas = np.concatenate([np.frombuffer(o.wall_um2, "<f4") for o in own.values()])
-    walls, first = np.unique(np.sort(row[at[known]], axis=1), axis=0, return_index=True)
-    return walls.astype(np.int32), areas[known][first]
+    areas = np.concatenate([np.frombuffer(o.interface_um2, "<f4") for o in own.values()])
+    interfaces, first = np.unique(np.sort(row[at[known]], axis=1), axis=0, return_index=True)
+    return interfaces.astype(np.int32), areas[known][first]

@@ -8,9 +8,9 @@ import hashlib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import AliasChoices, ConfigDict, Field, TypeAdapter, ValidationError
 
 from stereocell.formats.tiles3d import TileLod
 from stereocell.model.errors import OutputError
@@ -21,6 +21,8 @@ from stereocell.storage.file_list import sizes_of
 from stereocell.storage.json_files import read_json, write_json
 
 _RECORD = "tile.json"
+# Parts of earlier versions have another name for the areas.
+_INTERFACE_UM2 = Field(validation_alias=AliasChoices("interface_um2", "wall_um2"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,7 @@ class PackedObjects:
     values    float32 (n,) by column ID
     boxes     float32 (n, 6), least and largest (x, y, z), world um
     touching  uint64 (m, 2), labels of objects that share an interface
-    wall_um2  float32 (m,), area of each interface, um^2; NaN: not known
+    interface_um2  float32 (m,), area of each interface, um^2; NaN: not known
     """
 
     __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
@@ -51,7 +53,7 @@ class PackedObjects:
     values: dict[str, bytes]
     boxes: bytes
     touching: bytes
-    wall_um2: bytes
+    interface_um2: Annotated[bytes, _INTERFACE_UM2]
 
 
 @dataclass(frozen=True, slots=True)

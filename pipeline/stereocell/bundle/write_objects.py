@@ -73,14 +73,14 @@ def write_objects(
         if count > ROWS:
             entry["parts"] = hash_parts(values.tobytes())
         content["columns"].append(entry)
-    if table.walls is not None:
-        first, rows, order = _neighbours(table.walls, count)
+    if table.interfaces is not None:
+        first, rows, order = _neighbours(table.interfaces, count)
         content["neighbours"] = {
             "first": write("neighbours_first.bin", first),
             "rows": write("neighbours.bin", rows),
         }
-        if table.wall_um2 is not None and not np.isnan(table.wall_um2).any():
-            areas = np.tile(table.wall_um2, 2)[order].astype("<f4")
+        if table.interface_um2 is not None and not np.isnan(table.interface_um2).any():
+            areas = np.tile(table.interface_um2, 2)[order].astype("<f4")
             content["neighbours"]["area_um2"] = write("neighbours_um2.f32", areas)
     index = write_file(root, f"{folder}/{OBJECTS}", compact_json(content))
     return index, [index, *files]
@@ -146,7 +146,7 @@ def _quantize(values: NDArray[np.float32]) -> tuple[NDArray[np.uint8], dict[str,
 
 
 def _neighbours(
-    walls: NDArray[np.int32], count: int
+    interfaces: NDArray[np.int32], count: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.int64]]:
     """Return the neighbours of each row as a flat list.
 
@@ -154,7 +154,7 @@ def _neighbours(
     within a row, and an order (2 m,). The order sorts two copies of the interfaces, one after the
     other, in the same way as the neighbours.
     """
-    both = np.concatenate([walls, walls[:, ::-1]])
+    both = np.concatenate([interfaces, interfaces[:, ::-1]])
     order = np.lexsort((both[:, 1], both[:, 0]))
     both = both[order]
     first = np.zeros(count + 1, dtype="<u4")

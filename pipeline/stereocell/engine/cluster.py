@@ -155,25 +155,27 @@ class _Able(Generic[T, R]):
 
 
 def _require_alike(
-    who: str, worker: _Installation, ours: _Installation, shared: Path | None
+    place: str, worker: _Installation, ours: _Installation, shared: Path | None
 ) -> None:
-    who = f"{who} {worker.host}"
+    place = f"{place} {worker.host}"
     found = dict(worker.versions)
     for name, expected in ours.versions:
         if found.get(name) != expected:
-            raise ClusterError(f"{who}: has {name} {found.get(name, 'none')}, expected {expected}")
+            raise ClusterError(
+                f"{place}: has {name} {found.get(name, 'none')}, expected {expected}"
+            )
     found = dict(worker.extras)
     for name, expected in ours.extras:
         if expected and found[name] not in (expected, ""):
-            raise ClusterError(f"{who}: has {name} {found[name]}, expected {expected}")
+            raise ClusterError(f"{place}: has {name} {found[name]}, expected {expected}")
     if worker.code != ours.code:
         raise ClusterError(
-            f"{who}: runs other code than this command, expected the same installation of "
+            f"{place}: runs other code than this command, expected the same installation of "
             "StereoCell, and workers that were started after it"
         )
     if not worker.sees:
         raise ClusterError(
-            f"{who}: does not see {shared}, expected OUT in a file system that the whole cluster "
+            f"{place}: does not see {shared}, expected OUT in a file system that the whole cluster "
             "shares"
         )
 

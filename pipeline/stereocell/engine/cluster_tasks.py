@@ -68,13 +68,13 @@ def _completed(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
     from distributed import as_completed
 
     ended = as_completed(loop=client.loop)
-    looked, missed, waiting, most = -math.inf, 0, 0, 0
+    checked, missed, waiting, most = -math.inf, 0, 0, 0
     while missed < _LOOKS:
-        if time.monotonic() - looked > _LOOK_S:
+        if time.monotonic() - checked > _LOOK_S:
             threads = 0
             with suppress(Exception):  # if the scheduler is gone, the futures report it
                 threads = sum(client.nthreads().values())
-            looked, missed = time.monotonic(), 0 if threads else missed + 1
+            checked, missed = time.monotonic(), 0 if threads else missed + 1
             most = max(_AHEAD, 2 * threads)
         while waiting < most and (future := submit()) is not None:
             ended.add(future)

@@ -36,7 +36,7 @@ from stereocell.usd.read_stage import specimen_name
 HAND_M = 0.1  # m, size of a hand: limit for the specimen's longest edge without --scale
 UNIT = "mm"  # unit that slicers assume for numbers without a unit
 WALL_MM = 0.8  # mm, two lines of the usual nozzle of 0.4 mm
-_MAX_TOLD = 8  # parts with thin bodies that are reported; a label map may have thousands
+_MAX_REPORTED = 8  # parts with thin bodies that are reported; a label map may have thousands
 Color = tuple[float, float, float]
 
 
@@ -120,8 +120,8 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
     size = f"{x:.3g} x {y:.3g} x {z:.3g} {unit}, {scale:g} times the specimen of "
     size += describe_size(high - low)
     line = f"{counted(len(bodies), 'body', 'bodies')}, {count:,} triangles at lod{level}, {size}"
-    if len(thin) > _MAX_TOLD:
-        thin[_MAX_TOLD:] = [f"... and of {len(thin) - _MAX_TOLD} more parts"]
+    if len(thin) > _MAX_REPORTED:
+        thin[_MAX_REPORTED:] = [f"... and of {len(thin) - _MAX_REPORTED} more parts"]
     return "\n".join([line, *thin])
 
 

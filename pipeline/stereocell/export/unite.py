@@ -123,10 +123,12 @@ def cut_to(solid: manifold3d.Manifold, boxes: Sequence[Corners]) -> manifold3d.M
             if (other_low[across] < high[across]).all() and (low[across] < other_high[across]).all()
         ]
         size = high[axis] - low[axis]
-        is_met = any(np.isclose(other[axis], high[axis], atol=_HAIR * size) for other, _ in beside)
-        high[axis] += reach * (1 if is_met else -1)
-        is_met = any(np.isclose(other[axis], low[axis], atol=_HAIR * size) for _, other in beside)
-        low[axis] -= reach * (1 if is_met else -1)
+        has_next = any(
+            np.isclose(other[axis], high[axis], atol=_HAIR * size) for other, _ in beside
+        )
+        high[axis] += reach * (1 if has_next else -1)
+        has_next = any(np.isclose(other[axis], low[axis], atol=_HAIR * size) for _, other in beside)
+        low[axis] -= reach * (1 if has_next else -1)
     cubes = [
         manifold3d.Manifold.cube((high - low).tolist()).translate(low.tolist())
         for low, high in ends

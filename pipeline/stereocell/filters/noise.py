@@ -39,7 +39,7 @@ class NoiseSample:
     def __init__(self) -> None:
         self._least: list[NDArray[np.float32]] = []
         self._bright: list[NDArray[np.float32]] = []
-        self._looked_at = 0
+        self._count = 0
 
     def add(self, voxels: NDArray[Any], darkest: float | None = None) -> None:
         """Add some slices of a block (slice, row, column) of any number type.
@@ -56,7 +56,7 @@ class NoiseSample:
         if darkest is not None:
             is_even = np.maximum.reduce(apart) == 0
             is_padding = is_even & (slices[:, 1:-1, 1:-1] == darkest)
-        self._looked_at += least.size
+        self._count += least.size
         self._least.append(least[~is_padding])
         self._bright.append(bright[~is_padding])
 
@@ -65,7 +65,7 @@ class NoiseSample:
         measured = sum(map(len, self._least))
         if not measured:
             return 0.0
-        place = NOISIEST if measured >= (1 - MAX_EVEN) * self._looked_at else MIDDLE
+        place = NOISIEST if measured >= (1 - MAX_EVEN) * self._count else MIDDLE
         least, bright = np.concatenate(self._least), np.concatenate(self._bright)
         order = np.argsort(bright, kind="stable")
         classes = [_typical(least[part]) for part in np.array_split(order, CLASSES)]

@@ -8,7 +8,7 @@ from stereocell.inbox.choices import Choices
 from stereocell.inbox.inbox import Inbox
 from stereocell.inbox.item import Doing, Item
 from stereocell.inbox.lines import line_of, without_identity
-from stereocell.inbox.preparing import read_first_look
+from stereocell.inbox.preparing import write_first_view
 from stereocell.inbox.refused import RefusedError
 from stereocell.live.build_process import Build, BuildProcess
 from stereocell.read.addresses.resolved import Resolved
@@ -55,7 +55,7 @@ class Builds:
             with item.reading:
                 if item.is_deleted:
                     return
-                coarse, inputs = read_first_look(inbox, item, self._page)
+                coarse, inputs = write_first_view(inbox, item, self._page)
             build = BuildProcess(
                 self._make(
                     inputs.source,

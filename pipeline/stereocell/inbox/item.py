@@ -45,19 +45,19 @@ def new_id() -> str:
 class Item:
     """An uploaded specimen. Its fields change only under the lock of the inbox.
 
-    created     s since 1970
-    title       title that the reader gave; empty until the upload was read
-    line        reason of a failure, or empty
-    source      file or folder to open, below `upload`; empty for an address and before arranging
-    queued      place among the builds that wait, smaller ones first; 0 if no build waits
-    is_local    whether a person at this machine uploaded it
-    round       number of changes of the choices; tells answers to old choices from new ones
-    looked      the round of the first view; -1 if there is no view
-    newest      folder of the newest view, such as `g1/`, without views of the build; or empty
-    writer      the piece that may write; a later piece takes over
-    writing     lock that is held while bytes are written
-    reading     lock that is held while the upload is read and the results are written
-    is_deleted  whether the folder is being deleted, so that no reading may begin
+    created       s since 1970
+    title         title that the reader gave; empty until the upload was read
+    line          reason of a failure, or empty
+    source        file or folder to open, below `upload`; empty for an address and before arranging
+    queued        place among the builds that wait, smaller ones first; 0 if no build waits
+    is_local      whether a person at this machine uploaded it
+    round         number of changes of the choices; results of a smaller number are outdated
+    viewed_round  the round of the first view; -1 if there is no view
+    newest        folder of the newest view, such as `g1/`, without views of the build; or empty
+    writer        the piece that may write; a later piece takes over
+    writing       lock that is held while bytes are written
+    reading       lock that is held while the upload is read and the results are written
+    is_deleted    whether the folder is being deleted, so that no reading may begin
     """
 
     id: str
@@ -75,7 +75,7 @@ class Item:
     live: Live | None = None
     build: BuildProcess | None = None
     round: int = 0
-    looked: int = -1
+    viewed_round: int = -1
     newest: str = ""
     writer: object = None
     writing: threading.Lock = field(default_factory=threading.Lock)
@@ -115,7 +115,7 @@ class Item:
     @property
     def page(self) -> str:
         """The address of the view's page, relative to the inbox; empty without a current view."""
-        is_newest = self.doing == "built" or self.looked == self.round
+        is_newest = self.doing == "built" or self.viewed_round == self.round
         return f"items/{self.id}/view/" if self.has_view and is_newest else ""
 
     def place(self) -> Source:

@@ -14,7 +14,7 @@ from stereocell.inbox.item_build import ItemBuild
 from stereocell.inbox.item_tiles import ItemTiles
 from stereocell.inbox.limits import UNPACK_S
 from stereocell.inbox.lines import line_of, without_identity
-from stereocell.inbox.reader import Looked, Source, ToBuild
+from stereocell.inbox.reader import FirstView, Source, ToBuild
 from stereocell.inbox.refused import RefusedError
 from stereocell.live.build_process import Coarse
 from stereocell.live.reading import Reading
@@ -51,7 +51,7 @@ def _prepare(inbox: Inbox, item: Item) -> None:
         found = inbox.reader.run(
             item, "understand", source_of(item), choices, str(item.folder / "slices")
         )
-        _write_understood(item, found)
+        _write_facts(item, found)
     except Exception as error:  # a stranger's files may cause any error in a reader
         with inbox.changed:
             if item.doing in ("unpacking", "understanding"):
@@ -63,7 +63,7 @@ def _prepare(inbox: Inbox, item: Item) -> None:
             inbox.set(item, "understood")
 
 
-def _write_understood(item: Item, found: dict[str, Any]) -> None:
+def _write_facts(item: Item, found: dict[str, Any]) -> None:
     notes = [without_identity(item, note) for note in found["notes"]]
     write_json(item.understood_file, {**found, "notes": notes})
 
@@ -83,7 +83,7 @@ def _titled(item: Item) -> Choices:
     return replace(item.choices, title=item.title or item.choices.title)
 
 
-def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBuild]:
+def write_first_view(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBuild]:
     """Write the first view of an item, unless the item has one with its current choices.
 
     page  the folder of the viewer
@@ -94,10 +94,10 @@ def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBui
     item.view_folder.mkdir(parents=True, exist_ok=True)
     round_, bundle = item.round, None if item.page else next_view(item.view_folder)
     choices = _titled(item)
-    looked: Looked = inbox.reader.run(
+    view: FirstView = inbox.reader.run(
         item, "first_view", source_of(item), choices, None if bundle is None else str(bundle)
     )
-    found = looked.to_build.found
+    found = view.to_build.found
     if item.address:
         write_json(
             item.upload_folder / _FOUND,
@@ -107,10 +107,10 @@ def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBui
         with inbox.changed:
             tiles = ItemTiles(inbox, item, source_of(item), choices)
             item.live = _live_of(page, bundle, tiles, ItemBuild(inbox, item))
-            item.looked, item.newest = round_, f"{bundle.name}/"
+            item.viewed_round, item.newest = round_, f"{bundle.name}/"
             inbox.changed.notify_all()
-    coarse = Coarse(looked.plan, looked.read, item.out, item.view_folder, looked.sizes)
-    return coarse, looked.to_build
+    coarse = Coarse(view.plan, view.read, item.out, item.view_folder, view.sizes)
+    return coarse, view.to_build
 
 
 def _live_of(page: Path, bundle: Path, tiles: ItemTiles, build: ItemBuild) -> Live:
@@ -120,7 +120,7 @@ def _live_of(page: Path, bundle: Path, tiles: ItemTiles, build: ItemBuild) -> Li
     return Live(page, bundle, first, tiles, build, Reading(lambda _: None))
 
 
-def look(inbox: Inbox, item: Item, page: Path) -> str:
+def view_item(inbox: Inbox, item: Item, page: Path) -> str:
     """Write the first view of an item, unless there is one; return the address of its page.
 
     page  the folder of the viewer
@@ -139,7 +139,7 @@ def look(inbox: Inbox, item: Item, page: Path) -> str:
         if item.is_deleted:
             raise RefusedError(410, "the item was deleted")
         try:
-            read_first_look(inbox, item, page)
+            write_first_view(inbox, item, page)
         except StereoCellError as error:
             raise RefusedError(422, line_of(item, error)) from None
     return item.page

@@ -70,7 +70,7 @@ class ToBuild:
 
 
 @dataclass(frozen=True, slots=True)
-class Looked:
+class FirstView:
     """The plan, voxels and choices from which the first view of an item was made.
 
     read   coarse voxels by channel; see `first_view.read_channels`
@@ -176,7 +176,7 @@ class Reader:
             },
         }
 
-    def first_view(self, source: Source, choices: Choices, bundle: str | None) -> Looked:
+    def first_view(self, source: Source, choices: Choices, bundle: str | None) -> FirstView:
         """Write the first view of a source; return the inputs from which it was made.
 
         bundle  the folder of the view; None if the view is already written
@@ -187,7 +187,7 @@ class Reader:
             look.write(Path(bundle), sizes)
         place, chosen = self._place_of(source, choices)
         found = resolve(place) if place == source.place else Resolved(place)
-        return Looked(look.plan, look.read(), sizes, ToBuild(place, found, chosen))
+        return FirstView(look.plan, look.read(), sizes, ToBuild(place, found, chosen))
 
     def fine_tile(
         self,

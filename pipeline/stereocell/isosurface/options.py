@@ -33,7 +33,7 @@ class Criterion:
     discounts_noise: bool = False
 
 
-LADDER, ADAPTIVE = "ladder", "adaptive"
+LEVELS, ADAPTIVE = "levels", "adaptive"
 CRITERIA = {
     "edges": Criterion(lambda total, area: total / area**0.5, discounts_noise=True),
     "compromise": Criterion(lambda total, area: total / area**0.5),
@@ -41,7 +41,7 @@ CRITERIA = {
     "pekar-total": Criterion(lambda total, area: total),
     "pekar-area": Criterion(lambda total, area: area),
 }
-RUNGS = {"outer": 0, "inner": 1, "third": 2}  # names of the levels, outermost first
+LEVEL_NAMES = {"outer": 0, "inner": 1, "third": 2}  # names of the levels, outermost first
 APART = "apart"  # the level that shows the most separate components: cells in tissue
 CONNECTED = "connected"  # the lowest level that keeps vessels connected and floods nothing
 NO_SURFACE = "none"  # no surface at any level: the channel is drawn only as a volume
@@ -76,11 +76,11 @@ class IsoValueOptions:
     """
 
     criterion: str = setting(
-        LADDER,
-        f"{LADDER}: by the levels of all tiles' histograms; {', '.join(CRITERIA)}: by edges; "
+        LEVELS,
+        f"{LEVELS}: by the levels of all tiles' histograms; {', '.join(CRITERIA)}: by edges; "
         f"{ADAPTIVE}: by the channel's threshold",
         flag=Flag(
-            "--iso-criterion", "how iso-values are found: ladder (default), edges, adaptive, ..."
+            "--iso-criterion", "how iso-values are found: levels (default), edges, adaptive, ..."
         ),
     )
     scope: str = setting(
@@ -88,10 +88,10 @@ class IsoValueOptions:
         "channel: one level for all tiles; tile: a level for each tile, near the channel's",
         flag=Flag("--iso-scope", "channel (default): one level for all tiles; tile: one for each"),
     )
-    rung: str = setting(
+    level: str = setting(
         "outer",
-        f"clear level that has the surface: {', '.join(RUNGS)}; {APART}: the one with the most "
-        "components, if the largest hold under a quarter of its voxels (two thirds where many "
+        f"clear level that has the surface: {', '.join(LEVEL_NAMES)}; {APART}: the one with the "
+        "most components, if the largest hold under a quarter of its voxels (two thirds where many "
         f"cells touch); {CONNECTED}: the lowest at which vessels are connected and nothing else "
         f"is inside; {NO_SURFACE}: no level",
     )
@@ -109,11 +109,11 @@ class IsoValueOptions:
     )
 
     def __post_init__(self) -> None:
-        known = (LADDER, *CRITERIA, ADAPTIVE)
+        known = (LEVELS, *CRITERIA, ADAPTIVE)
         for name, found, expected in (
             ("criterion", self.criterion, known),
             ("scope", self.scope, SCOPES),
-            ("rung", self.rung, (*RUNGS, APART, CONNECTED, NO_SURFACE)),
+            ("level", self.level, (*LEVEL_NAMES, APART, CONNECTED, NO_SURFACE)),
         ):
             if found not in expected:
                 raise UsageError(

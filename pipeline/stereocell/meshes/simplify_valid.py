@@ -216,7 +216,10 @@ def _around(
     at = draft.positions.astype(np.float64)
     one, other, whole = (
         at[draft.triangles[some]]
-        for some in (*defects.crossings.T, np.concatenate([defects.degenerate, defects.walls]))
+        for some in (
+            *defects.crossings.T,
+            np.concatenate([defects.degenerate, defects.in_cut_plane]),
+        )
     )
     edges = at[np.concatenate([defects.open, defects.non_manifold_edges])]
     vertices = at[defects.non_manifold_vertices]

@@ -39,7 +39,7 @@ class Defects:
     non_manifold_vertices  vertices (n,) whose triangles form more than one fan
     inside_out             one triangle (n,) of each body that is wound inwards
     crossings              pairs (n, 2) of triangles that meet away from their common corners
-    walls                  triangles (n,) in a cut plane, where the neighbour may have one as well
+    in_cut_plane           triangles (n,) in a cut plane, where the neighbour may have one as well
     """
 
     degenerate: Indices
@@ -48,7 +48,7 @@ class Defects:
     non_manifold_vertices: Indices
     inside_out: Indices
     crossings: Indices
-    walls: Indices
+    in_cut_plane: Indices
 
     @property
     def counts(self) -> dict[str, int]:
@@ -62,7 +62,7 @@ class Defects:
 
     def vertices(self, triangles: NDArray[np.integer]) -> Indices:
         """Return the vertices of all defects, int64 (n,), sorted. triangles: the mesh's (m, 3)."""
-        whole = (self.degenerate, self.inside_out, self.walls, self.crossings.ravel())
+        whole = (self.degenerate, self.inside_out, self.in_cut_plane, self.crossings.ravel())
         at = np.concatenate(whole)
         corners = triangles[at].astype(np.int64).ravel()
         parts = [
@@ -148,7 +148,7 @@ def find_defects(
         non_manifold_vertices=topology.non_manifold_vertices,
         inside_out=_inside_out(mesh, topology, planes),
         crossings=used[crossings],
-        walls=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
+        in_cut_plane=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
     )
 
 

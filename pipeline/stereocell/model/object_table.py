@@ -33,7 +33,7 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True)
-class SharedWalls:
+class SharedInterfaces:
     """Interfaces between objects.
 
     labels    uint64 (m, 2), labels of the two objects
@@ -55,9 +55,9 @@ class ObjectTable:
     columns  the properties; `volume_um3` is always the first
     names    names for people, such as those of organs; empty: objects have no names
     default  ID of the column that colours objects at first; empty: each has a hue of its own
-    walls    int32 (m, 2): rows of two objects with a common interface, each pair once; None: not
-             known
-    wall_um2 float32 (m,), area of each interface at the finest level; NaN: not known
+    interfaces     int32 (m, 2): rows of two objects with a common interface, each pair once; None:
+                   not known
+    interface_um2  float32 (m,), area of each interface at the finest level; NaN: not known
     colors   float32 (n, 3), linear RGB from the label map's file, NaN for an object without one;
              None: no object has one
     """
@@ -68,8 +68,8 @@ class ObjectTable:
     columns: tuple[Column, ...]
     names: tuple[str, ...] = ()
     default: str = ""
-    walls: NDArray[np.int32] | None = None
-    wall_um2: NDArray[np.float32] | None = None
+    interfaces: NDArray[np.int32] | None = None
+    interface_um2: NDArray[np.float32] | None = None
     colors: NDArray[np.float32] | None = None
 
     def of_tile(self, tile: str) -> "ObjectTable":
@@ -82,18 +82,18 @@ class ObjectTable:
             rows={tile: np.arange(len(rows), dtype=np.int32)},
             columns=tuple(replace(one, values=one.values[rows]) for one in self.columns),
             names=tuple(self.names[row] for row in rows.tolist()) if self.names else (),
-            walls=None,
-            wall_um2=None,
+            interfaces=None,
+            interface_um2=None,
             colors=None if self.colors is None else self.colors[rows],
         )
 
-    def touching(self, tile: str) -> SharedWalls:
+    def touching(self, tile: str) -> SharedInterfaces:
         """Return the interfaces of a tile's objects. The first label is the tile's own object."""
-        if self.walls is None or self.wall_um2 is None:
-            return SharedWalls(np.zeros((0, 2), np.uint64), np.zeros(0, np.float32))
-        both = np.concatenate([self.walls, self.walls[:, ::-1]])
+        if self.interfaces is None or self.interface_um2 is None:
+            return SharedInterfaces(np.zeros((0, 2), np.uint64), np.zeros(0, np.float32))
+        both = np.concatenate([self.interfaces, self.interfaces[:, ::-1]])
         kept = np.isin(both[:, 0], self.rows[tile])
-        return SharedWalls(self.labels[both[kept]], np.tile(self.wall_um2, 2)[kept])
+        return SharedInterfaces(self.labels[both[kept]], np.tile(self.interface_um2, 2)[kept])
 
     def column(self, column_id: str) -> Column | None:
         """Return a column by its ID; None: there is none."""

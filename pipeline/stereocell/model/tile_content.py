@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stereocell.model.channel import PaintColors
 from stereocell.model.mesh import Lod
-from stereocell.model.object_table import ObjectTable, SharedWalls
+from stereocell.model.object_table import ObjectTable, SharedInterfaces
 from stereocell.model.spacing import Point, Spacing
 
 APRON = 1  # voxels added on every side of a volume, which trilinear filtering reads
@@ -41,7 +41,7 @@ class ChannelContent:
     closed: Path | None = None
     measured: NDArray[Any] | None = None
     objects: ObjectTable | None = None
-    touching: SharedWalls | None = None
+    touching: SharedInterfaces | None = None
     color: tuple[float, float, float] | None = None
 
 

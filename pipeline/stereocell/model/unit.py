@@ -29,9 +29,9 @@ class ObjectFacts:
     labels    uint64 (n,), labels, ascending
     voxels    int64 (n,), number of voxels
     area_um2  float64 (n,), area of the surface without the planes that cut an object into pieces
-    walls     int32 (m,), index of the object at each interface
+    interface_objects  int32 (m,), index of the object at each interface
     beside    uint64 (m,), label of the object on the other side
-    wall_um2  float64 (m,), area of the interface
+    interface_um2  float64 (m,), area of the interface
     means     float64 (n, channels), means of the image's channels over an object's voxels
     p95s      float64 (n, channels), their 95th percentiles; NaN for a piece
     pieces    int32 (k,), indices of the pieces
@@ -46,9 +46,9 @@ class ObjectFacts:
     labels: NDArray[np.uint64]
     voxels: NDArray[np.int64]
     area_um2: NDArray[np.float64]
-    walls: NDArray[np.int32]
+    interface_objects: NDArray[np.int32]
     beside: NDArray[np.uint64]
-    wall_um2: NDArray[np.float64]
+    interface_um2: NDArray[np.float64]
     means: NDArray[np.float64]
     p95s: NDArray[np.float64]
     pieces: NDArray[np.int32]

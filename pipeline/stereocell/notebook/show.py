@@ -101,7 +101,7 @@ def show(
                 settings=settings or {},
             )
         bundle = folder / "bundle"
-        viewer = _viewer(bundle, folder, quality=chosen, told=printed, height=height, state=state)
+        viewer = _viewer(bundle, folder, quality=chosen, notes=printed, height=height, state=state)
     except BaseException:
         if kept is None:
             shutil.rmtree(folder, ignore_errors=True)
@@ -135,7 +135,7 @@ def _viewer(
     height: int,
     state: Mapping[str, Any],
     quality: str = "",
-    told: str = "",
+    notes: str = "",
 ) -> "Viewer":
     from stereocell.notebook.bundle_files import NotebookBundle
     from stereocell.notebook.picture import draw, no_picture
@@ -147,7 +147,7 @@ def _viewer(
     viewer = Viewer(
         files,
         quality=quality,
-        told=told,
+        notes=notes,
         draw=no_picture if out is None else partial(draw, out),
         height=height,
     )

@@ -42,7 +42,7 @@ class Viewer(anywidget.AnyWidget):
               label map); or None. A point that is set gets a mark
     height    height of the viewer, CSS pixels
     quality   a sentence on how an array was reduced, or empty
-    told      the text that the build printed
+    notes     the text that the build printed
     """
 
     _esm = (_HERE / "widget.js").read_text("utf-8")
@@ -64,7 +64,7 @@ class Viewer(anywidget.AnyWidget):
         bundle: NotebookBundle,
         *,
         quality: str = "",
-        told: str = "",
+        notes: str = "",
         draw: Callable[[Appearances], bytes] = no_picture,
         height: int = 520,
     ) -> None:
@@ -77,11 +77,16 @@ class Viewer(anywidget.AnyWidget):
         self._draw = draw
         self._display_id = ""
         self._is_from_page = False
-        self.told = told
+        self.notes = notes
         super().__init__(height=height, _page=page.key(), _bundle=secrets.token_hex(8))
         self.set_trait("name", bundle.name)
         self.set_trait("quality", quality)
         self.on_msg(self._answer)
+
+    @property
+    def told(self) -> str:
+        """The earlier name of `notes`."""
+        return self.notes
 
     def set_channel(self, channel: str, **look: Any) -> None:
         """Set some of a channel's `visible`, `color`, `opacity` and `window`; the others stay."""

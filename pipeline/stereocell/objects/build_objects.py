@@ -32,15 +32,15 @@ MARGIN = 2  # empty voxels around the labels, see make_well_composed
 class BuiltObjects:
     """The objects of a tile, n of them in the order of `owned`.
 
-    lods          finest first; `Mesh.objects` holds indices of objects; empty without objects
-    volumes_um3   float64 (n,), volumes of their voxels
-    areas_um2     float64 (n,), areas of their surfaces at the finest level
-    largest_bias  for each level, the largest relative error of an object's volume
-    stopped       levels at which simplification stopped early
-    walls         int32 (m, 2): an object's index, and the label of another object that it touches
-    wall_um2      float64 (m,), area of that interface
-    changed       number of voxels that were changed so that no object touches itself by an edge
-    thin          int32 (k,), objects that are too thin to be built; they are not among the n
+    lods           finest first; `Mesh.objects` holds indices of objects; empty without objects
+    volumes_um3    float64 (n,), volumes of their voxels
+    areas_um2      float64 (n,), areas of their surfaces at the finest level
+    largest_bias   for each level, the largest relative error of an object's volume
+    stopped        levels at which simplification stopped early
+    interfaces     int32 (m, 2): an object's index, and the label of another object that it touches
+    interface_um2  float64 (m,), area of that interface
+    changed        number of voxels that were changed so that no object touches itself by an edge
+    thin           int32 (k,), objects that are too thin to be built; they are not among the n
     """
 
     lods: tuple[Lod, ...]
@@ -48,8 +48,8 @@ class BuiltObjects:
     areas_um2: NDArray[np.float64]
     largest_bias: tuple[float, ...]
     stopped: tuple[int, ...]
-    walls: NDArray[np.int32]
-    wall_um2: NDArray[np.float64]
+    interfaces: NDArray[np.int32]
+    interface_um2: NDArray[np.float64]
     changed: int
     thin: NDArray[np.int32]
 
@@ -82,7 +82,7 @@ def build_objects(
         thin = np.intersect1d(owned, thin)
         owned = np.setdiff1d(owned, thin)
     z, y, x = (o - MARGIN * s for o, s in zip(origin_um, spacing_um, strict=True))
-    with clock("walls"):
+    with clock("interfaces"):
         interfaces = extract_interfaces(mended, spacing_um, step_um, origin_um=(z, y, x))
         del mended
         interfaces = _with_owned(interfaces, owned)
@@ -91,8 +91,8 @@ def build_objects(
     is_owned[owned] = True
     voxels = np.bincount(padded.ravel(), minlength=count)
     volumes = np.where(is_owned, voxels * float(np.prod(spacing_um)), np.nan)
-    pairs, wall_um2 = measure_areas(interfaces)
-    mine = np.concatenate([pairs, pairs[:, ::-1]]), np.concatenate([wall_um2, wall_um2])
+    pairs, interface_um2 = measure_areas(interfaces)
+    mine = np.concatenate([pairs, pairs[:, ::-1]]), np.concatenate([interface_um2, interface_um2])
     kept = is_owned[mine[0][:, 0]]
     touching, areas = mine[0][kept], mine[1][kept]
     place = np.searchsorted(owned, touching[:, 0]).astype(np.int32)

@@ -101,8 +101,8 @@ def find_faults(
     """
     triangles = interfaces.triangles.astype(np.int64)
     crossings = find_crossings(interfaces.positions, triangles, fresh=fresh)
-    looked_at = triangles if fresh is None else triangles[fresh]
-    flat = looked_at[find_flat(interfaces.positions, looked_at)]
+    compared = triangles if fresh is None else triangles[fresh]
+    flat = compared[find_flat(interfaces.positions, compared)]
     return np.unique(np.concatenate([triangles[crossings.ravel()], flat]))
 
 

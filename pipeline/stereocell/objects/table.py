@@ -48,13 +48,16 @@ def own_columns(
         p95s[rows] = one.p95s
         for piece, quantiles in zip(one.pieces.tolist(), one.quantiles, strict=True):
             cut.setdefault(int(rows[piece]), []).append((quantiles, int(one.voxels[piece])))
-        np.add.at(shared, rows[one.walls], one.wall_um2)
+        np.add.at(shared, rows[one.interface_objects], one.interface_um2)
     for row, parts in cut.items():
         held = np.stack([quantiles for quantiles, _ in parts])
         counts = np.array([count for _, count in parts])
         p95s[row] = [merge_quantiles(held[:, k], counts) for k in range(len(channels))]
     # A neighbour that consists of several pieces counts once.
-    pairs = [np.stack([rows[one.walls].astype(np.uint64), one.beside], 1) for rows, one in facts]
+    pairs = [
+        np.stack([rows[one.interface_objects].astype(np.uint64), one.beside], 1)
+        for rows, one in facts
+    ]
     if pairs:
         found = np.unique(np.concatenate(pairs), axis=0)
         touching += np.bincount(found[:, 0].astype(np.int64), minlength=count)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from stereocell.isosurface.options import NO_SURFACE, RUNGS, parse_level
+from stereocell.isosurface.options import LEVEL_NAMES, NO_SURFACE, parse_level
 from stereocell.model.color import linear_color
 from stereocell.model.errors import UsageError
 from stereocell.model.identifiers import to_identifier
@@ -53,7 +53,7 @@ class Channel:
     source       source of this channel alone, which a command added to the plan. It has only the
                  planned level, and voxels in uint8 with the window 0..255. Empty: the plan's source
     fingerprint  fingerprint of that source
-    rung         which of the found levels has the surface (`inner`), or a voxel value (`162`), or
+    level        which of the found levels has the surface (`inner`), or a voxel value (`162`), or
                  a value above the background (`162+b`); empty: the settings decide
     base         name of the source's channel, if it has several surfaces and this is one of them;
                  empty: `name` is the source's channel
@@ -64,7 +64,7 @@ class Channel:
     color: tuple[float, float, float]
     source: str = ""
     fingerprint: str = ""
-    rung: str = ""
+    level: str = ""
     base: str = ""
 
     @property
@@ -122,43 +122,43 @@ def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> lis
         if channel.name not in given:
             found.append(channel)
             continue
-        rungs = [part.strip() for part in given[channel.name].split(",")]
-        if rungs == [NO_SURFACE]:
-            found.append(replace(channel, rung=NO_SURFACE))
+        surfaces = [part.strip() for part in given[channel.name].split(",")]
+        if surfaces == [NO_SURFACE]:
+            found.append(replace(channel, level=NO_SURFACE))
             continue
-        for rung in rungs:
-            if rung not in RUNGS:
-                _require_level(channel.name, rung)
-        if len(set(rungs)) < len(rungs):
-            found_twice = ",".join(rungs)
+        for surface in surfaces:
+            if surface not in LEVEL_NAMES:
+                _require_level(channel.name, surface)
+        if len(set(surfaces)) < len(surfaces):
+            found_twice = ",".join(surfaces)
             raise UsageError(f"--surfaces {channel.name}: found {found_twice}, expected each once")
-        if len(rungs) == 1:
-            found.append(replace(channel, rung=rungs[0]))
+        if len(surfaces) == 1:
+            found.append(replace(channel, level=surfaces[0]))
             continue
-        for place, rung in enumerate(rungs):
+        for place, surface in enumerate(surfaces):
             # each further surface is lighter; if the channel's colour is pale, darker
-            share, end = place / len(rungs), float(min(channel.color) < _PALE)
+            share, end = place / len(surfaces), float(min(channel.color) < _PALE)
             red, green, blue = (part + share * (end - part) for part in channel.color)
             found.append(
                 replace(
                     channel,
-                    name=f"{channel.name} {rung}",
+                    name=f"{channel.name} {surface}",
                     color=(red, green, blue),
-                    rung=rung,
+                    level=surface,
                     base=channel.name,
                 )
             )
     return found
 
 
-def _require_level(name: str, rung: str) -> None:
+def _require_level(name: str, surface: str) -> None:
     """Raise UsageError if a surface is named neither by a level's name nor by a voxel value."""
     try:
-        parse_level("", rung)
+        parse_level("", surface)
     except UsageError:
         raise UsageError(
-            f"--surfaces {name}: found {rung!r:.40}, expected {', '.join(RUNGS)}, voxel values or "
-            f"values above the background as 162+b, between commas; or {NO_SURFACE}"
+            f"--surfaces {name}: found {surface!r:.40}, expected {', '.join(LEVEL_NAMES)}, voxel "
+            f"values or values above the background as 162+b, between commas; or {NO_SURFACE}"
         ) from None
 
 
@@ -178,8 +178,8 @@ def by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> d
             raise UsageError(f"{flag} names channel {name!r} by name and by index, expected one")
         found[name] = value
     if ALL in given:
-        # a channel with a `rung` has its level from there, so ALL does not apply to it
-        found = {one.name: given[ALL] for one in channels if not one.rung} | found
+        # a channel with a `level` of its own keeps it, so ALL does not apply to it
+        found = {one.name: given[ALL] for one in channels if not one.level} | found
     return found
 
 
@@ -189,9 +189,9 @@ def require_no_background(settings: Settings, channels: Sequence[Channel], modal
         return
     given = [(f"--iso-value {key}", value) for key, value in settings.iso_values.items()]
     given += [
-        (f"--surfaces {channel.base or channel.name}", channel.rung)
+        (f"--surfaces {channel.base or channel.name}", channel.level)
         for channel in channels
-        if channel.rung and channel.rung not in (*RUNGS, NO_SURFACE)
+        if channel.level and channel.level not in (*LEVEL_NAMES, NO_SURFACE)
     ]
     for flag, value in given:
         if parse_level(flag, value)[1]:

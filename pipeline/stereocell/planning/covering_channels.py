@@ -44,7 +44,7 @@ def leave_out_covering(plan: Plan, chosen: Mapping[str, Chosen]) -> dict[str, Ch
     covering = {
         one.id
         for one in plan.channels
-        if shares[one.id] > most and not (one.rung or one.source or chosen[one.id].found.is_given)
+        if shares[one.id] > most and not (one.level or one.source or chosen[one.id].found.is_given)
     }
     return {
         one.id: _without_surface(one, chosen[one.id], shares[one.id])

@@ -16,9 +16,9 @@ from stereocell.isosurface.options import (
     APART,
     CONNECTED,
     CRITERIA,
-    LADDER,
+    LEVEL_NAMES,
+    LEVELS,
     NO_SURFACE,
-    RUNGS,
     IsoValueOptions,
     parse_level,
 )
@@ -90,7 +90,8 @@ def find_level(
         assert given is not None
         return Found(window, None, {}, (given[0],), given[1], "", is_fixed=True, is_given=True)
     options = plan.settings.isovalue
-    criterion = LADDER if channel.rung else options.criterion
+    wanted = channel.level or options.level
+    criterion = LEVELS if channel.level else options.criterion
     find = partial(
         find_levels,
         list(evidence.values()),
@@ -100,7 +101,7 @@ def find_level(
         options=options if criterion in CRITERIA else None,
     )
     levels = find(subtracts=None if given is None else given[1])
-    wants_cells = (channel.rung or options.rung) == APART and _shows_cells(plan)
+    wants_cells = wanted == APART and _shows_cells(plan)
     if given is None and wants_cells and not levels.subtracts:
         # Cells in dim and in bright tissue rise equally far above the tissue. If nothing sparse
         # rises above it, such a level would only show the tissue's own texture.
@@ -119,11 +120,11 @@ def find_level(
         return Found(
             window, levels, evidence, (rated,), subtracts, "", is_fixed=True, is_given=True
         )
-    if (channel.rung or options.rung) == NO_SURFACE:
+    if wanted == NO_SURFACE:
         reason = f"no surface is built by default (--surfaces {channel.name}=outer builds one)"
         return Found(window, levels, evidence, (), levels.subtracts, reason)
-    is_outer = options.rung in (APART, CONNECTED) or RUNGS[channel.rung or options.rung] == 0
-    if half is not None and criterion == LADDER and is_outer:
+    is_outer = options.level in (APART, CONNECTED) or LEVEL_NAMES[wanted] == 0
+    if half is not None and criterion == LEVELS and is_outer:
         return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
     highest = highest_of(window.statistics, levels.subtracts)
     clear = levels.shown(highest)
@@ -136,15 +137,14 @@ def find_level(
         plain = replace(levels, subtracts=False)
         rated = threshold.value if levels.subtracts else levels.judge(threshold.value)
         return Found(window, plain, evidence, (rated,), False, "", is_fixed=True)
-    rung = channel.rung or options.rung
-    if rung == APART:
+    if wanted == APART:
         clear = _fit_for_cells(clear, highest) if wants_cells else clear[:1]
-    elif rung == CONNECTED:
+    elif wanted == CONNECTED:
         clear = find_vessel_levels(levels)
     elif clear:
-        place = RUNGS[rung]
+        place = LEVEL_NAMES[wanted]
         if place >= len(clear):
-            reason = f"no clear surface: found {len(clear)} clear levels, none of them the {rung}"
+            reason = f"no clear surface: found {len(clear)} clear levels, none of them the {wanted}"
         clear = clear[place : place + 1]
     return Found(window, levels, evidence, clear, levels.subtracts, reason)
 
@@ -228,10 +228,10 @@ def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
 
     None: the settings state no value.
     """
-    if channel.rung:
-        if channel.rung in (*RUNGS, NO_SURFACE):
+    if channel.level:
+        if channel.level in (*LEVEL_NAMES, NO_SURFACE):
             return None
-        return parse_level(f"--surfaces {channel.base or channel.name}", channel.rung)
+        return parse_level(f"--surfaces {channel.base or channel.name}", channel.level)
     given = plan.settings.iso_values.get(channel.name)
     return None if given is None else parse_level(f"--iso-value {channel.name}", given)
 
@@ -243,7 +243,7 @@ def choose_by_components(options: IsoValueOptions, by_level: Sequence[Components
     """
     if len(by_level) < 2:
         return 0
-    return choose_connected(by_level) if options.rung == CONNECTED else choose_apart(by_level)
+    return choose_connected(by_level) if options.level == CONNECTED else choose_apart(by_level)
 
 
 def choose_apart(by_level: Sequence[Components]) -> int:

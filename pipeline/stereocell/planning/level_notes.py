@@ -19,15 +19,15 @@ _CHOICES = {
 
 def note_before_reading(plan: Plan, channel: Channel) -> str:
     """Return the note on a channel whose level is known without voxels; empty: it is not."""
-    rung = channel.rung or plan.settings.isovalue.rung
+    wanted = channel.level or plan.settings.isovalue.level
     given = given_level(plan, channel)
     if given is not None:
         value, is_above = given
         return f"level {value:.5g}{MARK + ABOVE_BACKGROUND if is_above else ''}, from the settings"
-    if rung == NO_SURFACE:
+    if wanted == NO_SURFACE:
         base = channel.base or channel.name
         return f"no surface is built by default (--surfaces {base}=outer builds one)"
-    return f"the build finds the {rung} level" if channel.rung else ""
+    return f"the build finds the {wanted} level" if channel.level else ""
 
 
 def note_on_found(plan: Plan, found: Found, *, is_whole: bool) -> str:
@@ -46,16 +46,16 @@ def note_on_found(plan: Plan, found: Found, *, is_whole: bool) -> str:
             kind = "half-way between the two values of a mask"
         return f"level {about}{value:.{digits}g}, {kind}"
     if len(levels) > 1:
-        choice = _CHOICES[plan.settings.isovalue.rung]
+        choice = _CHOICES[plan.settings.isovalue.level]
         return f"the build takes one of {about}{words_of(levels, mark, digits)}: {choice}{tail}"
-    ladder = () if found.levels is None else found.levels.all_levels
+    all_levels = () if found.levels is None else found.levels.all_levels
     if not levels:
-        near = find_near_levels(ladder, None, is_unsure=False)
+        near = find_near_levels(all_levels, None, is_unsure=False)
         reason = found.reason.removeprefix("no clear surface: ")
         text = f"no surface{'' if is_whole else ' in the blocks that were read'}: {reason}"
     else:
         unsure = _explain_uncertainty(plan, found, is_whole)
-        near = find_near_levels(ladder, levels[0].value, is_unsure=bool(unsure))
+        near = find_near_levels(all_levels, levels[0].value, is_unsure=bool(unsure))
         text = f"level {about}{words_of(levels, mark, digits)}"
         text = f"unsure {text}: {unsure}" if unsure else f"clear {text}"
     beside = f"; near levels: {words_of(near, mark, digits)}" if near else ""

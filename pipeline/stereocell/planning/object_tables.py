@@ -119,14 +119,14 @@ def _interfaces(
         at = np.searchsorted(labels[order], one.beside).clip(0, max(len(labels) - 1, 0))
         other = order[at] if len(order) else at
         known = labels[other] == one.beside if len(order) else np.zeros(0, bool)
-        found.append(np.stack([rows[tile][one.walls][known], other[known]], axis=1))
-        areas.append(one.wall_um2[known])
+        found.append(np.stack([rows[tile][one.interface_objects][known], other[known]], axis=1))
+        areas.append(one.interface_um2[known])
     pairs, place = np.unique(np.concatenate(found), axis=0, return_inverse=True)
     sums = np.bincount(place.ravel(), np.concatenate(areas), len(pairs))
-    walls, place = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
-    largest = np.zeros(len(walls))
+    interfaces, place = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+    largest = np.zeros(len(interfaces))
     np.maximum.at(largest, place.ravel(), sums)
-    return walls.astype(np.int32), largest.astype(np.float32)
+    return interfaces.astype(np.int32), largest.astype(np.float32)
 
 
 def _order(located: Located, facts: Mapping[str, ObjectFacts]) -> NDArray[np.int64]:

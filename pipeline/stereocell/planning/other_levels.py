@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stereocell.isosurface.level import Level, shown_of
-from stereocell.isosurface.options import ADAPTIVE, RUNGS
+from stereocell.isosurface.options import ADAPTIVE, LEVEL_NAMES
 from stereocell.planning.channels import Channel
 from stereocell.planning.level_choice import given_level
 from stereocell.planning.plan import Plan
@@ -38,7 +38,7 @@ class OtherLevel:
 def find_other_levels(
     plan: Plan,
     channel: Channel,
-    ladder: Sequence[Level],
+    all_levels: Sequence[Level],
     *,
     subtracts: bool,
     taken: float | None,
@@ -48,7 +48,7 @@ def find_other_levels(
 ) -> list[OtherLevel]:
     """Return the next-best levels, at most MAX_SHOWN, best first; empty if no levels were found.
 
-    ladder     all levels that were found, outermost first
+    all_levels all levels that were found, outermost first
     subtracts  whether they count from the background
     taken      the surface's level; None: there is no surface
     threshold  the adaptive threshold, voxel value; None: there is none
@@ -59,20 +59,20 @@ def find_other_levels(
     The order is: found levels, clear ones first; the adaptive threshold; shifted levels; found
     levels with little confidence.
     """
-    if not ladder:
+    if not all_levels:
         return []
     # without a surface, no level can be chosen by its name
-    clear = () if taken is None else shown_of(ladder, highest)
-    named, doubtful = _found_levels(plan, channel, ladder, clear, subtracts)
+    clear = () if taken is None else shown_of(all_levels, highest)
+    named, doubtful = _found_levels(plan, channel, all_levels, clear, subtracts)
     likely = [level for level in doubtful if (level.confidence or 0.0) >= LIKELY]
     levels = [*named, *likely]
     if threshold is not None and plan.settings.isovalue.criterion != ADAPTIVE:
         # by value, because the setting `criterion` applies to all channels
         flag = take(plan, channel, threshold, above=False)
         levels.append(OtherLevel(ADAPTIVE, threshold, False, flag, None))
-    levels += _shifted(plan, channel, ladder, taken, subtracts)
+    levels += _shifted(plan, channel, all_levels, taken, subtracts)
     levels += [level for level in doubtful if level not in likely]
-    contrast = max(level.contrast for level in ladder)
+    contrast = max(level.contrast for level in all_levels)
     chosen: list[OtherLevel] = []
     for level in levels:
         if ends and level.above == subtracts and not ends[0] < level.value < ends[1]:
@@ -93,16 +93,16 @@ def ends_of(values: Sequence[float]) -> tuple[float, float] | None:
 def take(plan: Plan, channel: Channel, value: float, *, above: bool) -> str:
     """Return the flag that chooses a level: --surfaces if the channel has it, else --iso-value."""
     level = f"{value:.5g}{'+b' if above else ''}"
-    if channel.rung:
+    if channel.level:
         return _surfaces(plan, channel, level)
     return "--iso-value " + shlex.quote(f"{channel.name}={level}")
 
 
-def _surfaces(plan: Plan, channel: Channel, rung: str) -> str:
+def _surfaces(plan: Plan, channel: Channel, surface: str) -> str:
     """Return the flag that replaces this surface of a source channel and keeps its others."""
     base = channel.base or channel.name
     surfaces = [
-        rung if one == channel else one.rung
+        surface if one == channel else one.level
         for one in plan.channels
         if one == channel or (channel.base and one.base == base)
     ]
@@ -112,7 +112,7 @@ def _surfaces(plan: Plan, channel: Channel, rung: str) -> str:
 def _found_levels(
     plan: Plan,
     channel: Channel,
-    ladder: Sequence[Level],
+    all_levels: Sequence[Level],
     clear: Sequence[Level],
     subtracts: bool,
 ) -> tuple[list[OtherLevel], list[OtherLevel]]:
@@ -122,8 +122,8 @@ def _found_levels(
     name would choose another one: if the settings state the level, or each tile has its own.
     """
     by_name = given_level(plan, channel) is None and plan.settings.isovalue.scope == "channel"
-    built = {one.rung for one in plan.channels if channel.base and one.base == channel.base}
-    doubtful = [level for level in ladder if level not in clear]
+    built = {one.level for one in plan.channels if channel.base and one.base == channel.base}
+    doubtful = [level for level in all_levels if level not in clear]
     named = [
         OtherLevel(
             name,
@@ -134,7 +134,7 @@ def _found_levels(
             else take(plan, channel, clear[place].value, above=subtracts),
             clear[place].confidence,
         )
-        for name, place in RUNGS.items()
+        for name, place in LEVEL_NAMES.items()
         if place < len(clear) and name not in built
     ]
     doubtful.sort(key=lambda level: -level.confidence)
@@ -151,12 +151,12 @@ def _found_levels(
 
 
 def _shifted(
-    plan: Plan, channel: Channel, ladder: Sequence[Level], taken: float | None, subtracts: bool
+    plan: Plan, channel: Channel, all_levels: Sequence[Level], taken: float | None, subtracts: bool
 ) -> list[OtherLevel]:
     if taken is None:
-        nearest = max(ladder, key=lambda level: level.confidence)
+        nearest = max(all_levels, key=lambda level: level.confidence)
     else:
-        nearest = min(ladder, key=lambda level: abs(level.value - taken))
+        nearest = min(all_levels, key=lambda level: abs(level.value - taken))
     start = nearest.value if taken is None else taken
     return [
         OtherLevel(name, value, subtracts, take(plan, channel, value, above=subtracts), None)

@@ -15,6 +15,9 @@ from stereocell.planning.settings import from_dict
 _FORMAT, _VERSION = "stereocell-plan", 1
 _AGAIN = "remove it and run `stereocell plan INPUT -o OUT`"
 
+# Key of a channel in plans of an earlier version: the key now
+_RENAMED_IN_CHANNELS = {"rung": "level"}
+
 
 @cache
 def _adapter() -> TypeAdapter[Plan]:
@@ -27,7 +30,7 @@ def to_json(plan: Plan) -> dict[str, Any]:
     for tile in content["tiles"]:
         tile |= tile.pop("box")
     for channel in content["channels"]:
-        for key in ("source", "fingerprint", "rung", "base"):
+        for key in ("source", "fingerprint", "level", "base"):
             if not channel[key]:
                 del channel[key]
     for labels in content["labels"]:
@@ -42,9 +45,13 @@ def from_json(content: Mapping[str, Any], remedy: str = _AGAIN) -> Plan:
     Raises OutputError for content that no plan of StereoCell has.
     """
     tiles = [{"id": tile["id"], "box": tile} for tile in content["tiles"]]
-    settings = from_dict(content["settings"])
+    channels = [
+        {_RENAMED_IN_CHANNELS.get(key, key): value for key, value in channel.items()}
+        for channel in content["channels"]
+    ]
+    own = {"tiles": tiles, "channels": channels, "settings": from_dict(content["settings"])}
     try:
-        plan = _adapter().validate_python({**content, "tiles": tiles, "settings": settings})
+        plan = _adapter().validate_python({**content, **own})
         fault = _find_fault(plan)
     except ValidationError as error:  # text with half a surrogate pair
         first = error.errors(include_url=False)[0]

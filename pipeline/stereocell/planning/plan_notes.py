@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from stereocell.engine.run import console
-from stereocell.isosurface.options import LADDER, NO_SURFACE, RUNGS
+from stereocell.isosurface.options import LEVEL_NAMES, LEVELS, NO_SURFACE
 from stereocell.model.counted import counted
 from stereocell.model.errors import SourceError
 from stereocell.model.spacing import Spacing
@@ -114,11 +114,13 @@ def ignored_notes(settings: Settings, channels: Sequence[Channel]) -> Iterator[s
     for channel in channels:
         keys = (channel.name, str(channel.index), ALL)
         given = next((settings.iso_values[k] for k in keys if k in settings.iso_values), None)
-        if channel.rung and given is not None and given != settings.iso_values.get(ALL):
+        if channel.level and given is not None and given != settings.iso_values.get(ALL):
             yield f"{channel.name}: --surfaces chooses the level, so iso-value {given} is ignored"
-        if channel.rung and options.criterion != LADDER:
+        if channel.level and options.criterion != LEVELS:
             yield f"{channel.name}: --surfaces chooses the level, so {options.criterion} is ignored"
-        is_number = channel.rung not in (*RUNGS, NO_SURFACE) if channel.rung else given is not None
+        is_number = (
+            channel.level not in (*LEVEL_NAMES, NO_SURFACE) if channel.level else given is not None
+        )
         if is_number and options.scope == "tile":
             yield (
                 f"{channel.name}: the settings state its level, so all tiles have the same one, "

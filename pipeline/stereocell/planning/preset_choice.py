@@ -15,7 +15,13 @@ from stereocell.planning.ct_evidence import (
     find_ct_evidence,
     is_other_scale,
 )
+from stereocell.planning.earlier_names import (
+    COMMAND_LINE,
+    print_earlier_names,
+    with_present_names,
+)
 from stereocell.planning.input_files import as_asked
+from stereocell.planning.setting_names import flagged_settings, in_flags
 from stereocell.planning.settings import HOUNSFIELD, NO_PRESET, Settings, load
 from stereocell.planning.tracer_name import tracer_word
 from stereocell.read import Dataset
@@ -40,7 +46,7 @@ def load_for(
     config: Path | None,
     *,
     flags: Mapping[str, Any],
-    where: str = "command line",
+    where: str = COMMAND_LINE,
 ) -> tuple[Settings, tuple[str, ...]]:
     """Return the settings of a build, and notes for the plan.
 
@@ -50,6 +56,9 @@ def load_for(
 
     The arguments are those of `settings.load`.
     """
+    flags, lines = with_present_names(flags, where)
+    names = [flag.name for flag, _, _ in flagged_settings()] if where == COMMAND_LINE else []
+    print_earlier_names([in_flags(line, names) for line in lines])
     if preset is not None or config is not None:
         settings = load(preset, config, flags=flags, where=where)
         has_level = set(settings.iso_values) - {ALL} or settings.surfaces

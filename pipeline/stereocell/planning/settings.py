@@ -29,6 +29,11 @@ from stereocell.model.settings import (
     setting,
 )
 from stereocell.objects.options import ObjectOptions
+from stereocell.planning.earlier_names import (
+    COMMAND_LINE,
+    print_earlier_names,
+    with_present_names,
+)
 from stereocell.planning.setting_values import finite, require_utf8
 from stereocell.storage.documents import SETTINGS
 from stereocell.textures.options import UnwrapOptions
@@ -327,7 +332,7 @@ def load(
     config: Path | None,
     *,
     flags: Mapping[str, Any],
-    where: str = "command line",
+    where: str = COMMAND_LINE,
 ) -> Settings:
     """Return the settings of a preset, a TOML file and flags; later ones override earlier ones.
 
@@ -379,8 +384,11 @@ def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings
 
     where  name for the values in messages
 
-    Raises UsageError for unknown keys and wrong values.
+    Names of earlier versions are read, and a line is printed on each. Raises UsageError for unknown
+    keys and wrong values.
     """
+    values, lines = with_present_names(values, where)
+    print_earlier_names(lines)
     merged = to_dict(settings)
     by_channel = {section for section in merged if not is_dataclass(getattr(settings, section))}
     for section, content in values.items():
@@ -442,8 +450,9 @@ def to_dict(settings: Settings) -> dict[str, Any]:
 
 
 def from_dict(values: Mapping[str, Any]) -> Settings:
-    """Return settings from the output of `to_dict`."""
-    return apply(Settings(), values, "plan.json: settings")
+    """Return settings from the output of `to_dict`, of this version or an earlier one."""
+    where = "plan.json: settings"
+    return apply(Settings(), with_present_names(values, where)[0], where)
 
 
 def to_toml(settings: Settings, *, header: str = RECORD) -> str:

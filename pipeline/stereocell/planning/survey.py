@@ -5,9 +5,10 @@ pydantic turns the dataclasses into plain values and back, as survey.json holds 
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Annotated
 
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import AliasChoices, Field, TypeAdapter
 
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.level import Level
@@ -20,6 +21,7 @@ from stereocell.transfer.channel_statistics import ChannelStatistics
 # Least share of a body's voxels above its level, 0..1. In two trees of vessels it was .01 and .017,
 # in three heads and a brain .19 to .38.
 BODY_SHARE = 0.05
+_LEVELS = Field(validation_alias=AliasChoices("levels", "ladder"))  # surveys of earlier versions
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ class ChannelSurvey:
 
     statistics_file  file of the window, relative to OUT
     iso              level in each tile, by tile ID
-    ladder           all levels that were found, outermost first; empty if the level was given
+    levels           all levels that were found, outermost first; empty if the level was given
     curve            the histogram in which they were found; None if the level was given
     holder           a CT's table or head holder, which is left out; None: there is none
     grid_um          distance between the planes that carry the surface, um; 0: all planes do
@@ -66,7 +68,7 @@ class ChannelSurvey:
     iso: dict[str, TileIso]
     repair: RepairOptions
     appearance: Appearance
-    ladder: tuple[Level, ...]
+    levels: Annotated[tuple[Level, ...], _LEVELS]
     curve: Curve | None
     holder: Holder | None = None
     grid_um: float = 0.0
@@ -83,7 +85,7 @@ class ChannelSurvey:
         """The other levels that are clear or nearly clear, as text; empty: there are none."""
         level, surface = self.appearance.level, self.appearance.surface
         near = find_near_levels(
-            self.ladder, None if level is None else level.iso, is_unsure=surface == "unsure"
+            self.levels, None if level is None else level.iso, is_unsure=surface == "unsure"
         )
         if not near or self.statistics.background is None:
             return words_of(near) if near else ""

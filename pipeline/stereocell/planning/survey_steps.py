@@ -1,6 +1,6 @@
 """Make the steps of the survey: a channel's window, and the evidence for its level in each tile."""
 
-from stereocell.isosurface.options import CONNECTED, CRITERIA, LADDER
+from stereocell.isosurface.options import CONNECTED, CRITERIA, LEVELS
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box, Tile
 from stereocell.planning.channels import Channel
@@ -38,7 +38,7 @@ def window_step(plan: Plan, channel: Channel) -> FindWindow:
 
 def evidence_step(plan: Plan, box: Box, *, channel: Channel, window: Window) -> GatherEvidence:
     """Return the step that gathers the evidence for levels in a tile or another box."""
-    criterion = LADDER if channel.rung else plan.settings.isovalue.criterion
+    criterion = LEVELS if channel.level else plan.settings.isovalue.criterion
     return GatherEvidence(
         voxels_of(plan, channel),
         box,
@@ -64,7 +64,7 @@ def components_step(
     iso = level_of_tile(plan, tile, found, index, {}).value
     if iso is None:
         return None
-    compares = index > 0 and plan.settings.isovalue.rung == CONNECTED
+    compares = index > 0 and plan.settings.isovalue.level == CONNECTED
     surface = plan.settings.surface
     return SumComponents(
         voxels_of(plan, channel),

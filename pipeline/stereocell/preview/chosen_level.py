@@ -51,30 +51,30 @@ def choose_level(
     if not found.candidates:
         return Chosen(None)
     place = _index_of_level(plan, found, field)
-    rung = found.candidates[place]
-    if found.levels is None or not isinstance(rung, Level):
-        return Chosen(rung.value if isinstance(rung, Level) else rung)
+    level = found.candidates[place]
+    if found.levels is None or not isinstance(level, Level):
+        return Chosen(level.value if isinstance(level, Level) else level)
     if found.is_given:
-        return Chosen(rung.value)
+        return Chosen(level.value)
     unsure = explain_uncertainty(
         found, place, [level_of_tile(plan, one, found, place, {}) for one in tiles]
     )
-    if not unsure and rung.confidence < LOW_CONFIDENCE:
+    if not unsure and level.confidence < LOW_CONFIDENCE:
         unsure = f"below a confidence of {LOW_CONFIDENCE:g} about half of such surfaces are right"
-    value = rung.value
+    value = level.value
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
-        value = found.levels.level_of_tile(rung, found.evidence[tile.id])
-    return Chosen(value, rung.confidence, unsure)
+        value = found.levels.level_of_tile(level, found.evidence[tile.id])
+    return Chosen(value, level.confidence, unsure)
 
 
 def _index_of_level(plan: Plan, found: Found, field: NDArray[np.float32]) -> int:
     """Return the index in `found.candidates` of the level that one tile's components favour."""
     least = float(plan.settings.surface.min_diagonal_um)
-    rungs = [rung.value for rung in found.candidates if isinstance(rung, Level)]
-    compares = plan.settings.isovalue.rung == CONNECTED
+    values = [level.value for level in found.candidates if isinstance(level, Level)]
+    compares = plan.settings.isovalue.level == CONNECTED
     components: list[Components] = []
-    for place, value in enumerate(rungs if len(rungs) > 1 else []):
-        higher = field > rungs[place - 1] if compares and place else None
+    for place, value in enumerate(values if len(values) > 1 else []):
+        higher = field > values[place - 1] if compares and place else None
         sums = sum_components(field > value, plan.spacing_um, least, higher=higher)
         components.append({"": asdict(sums)})
     return choose_by_components(plan.settings.isovalue, components)

@@ -123,17 +123,17 @@ def cross_section(
     above = points[:, axis] >= at
     sides = above[triangles]
     mixed = sides.any(axis=1) & ~sides.all(axis=1)
-    met, sides = triangles[mixed].astype(np.int64), sides[mixed]
+    crossed, sides = triangles[mixed].astype(np.int64), sides[mixed]
     # One of the three corners is alone on its side. Both ends of the segment lie on its edges.
     lone = np.where(sides[:, 0] == sides[:, 1], 2, np.where(sides[:, 0] == sides[:, 2], 1, 0))
-    rows = np.arange(len(met))
-    tip = points[met[rows, lone]]
+    rows = np.arange(len(crossed))
+    tip = points[crossed[rows, lone]]
     ends = []
     for step in (1, 2):
-        other = points[met[rows, (lone + step) % 3]]
+        other = points[crossed[rows, (lone + step) % 3]]
         rise = other[:, axis] - tip[:, axis]
         ends.append(tip + (other - tip) * ((at - tip[:, axis]) / rise)[:, None])
-    return np.stack(ends, axis=1) if len(met) else np.zeros((0, 2, 3))
+    return np.stack(ends, axis=1) if len(crossed) else np.zeros((0, 2, 3))
 
 
 def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:

@@ -16,7 +16,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from stereocell.filters.denoise import denoise
 from stereocell.isosurface.channel_level import ChannelLevels
-from stereocell.isosurface.options import LADDER
+from stereocell.isosurface.options import LEVELS
 from stereocell.model.errors import NoSurfaceError, OutputError, UsageError
 from stereocell.model.tiling import Tile
 from stereocell.model.version import GENERATOR
@@ -87,13 +87,13 @@ class Candidate:
 class Preview:
     """The iso-values at which a channel's surface could lie, and the one that a build uses.
 
-    doubt   reason why a build makes no surface; empty if it makes one
-    basis   the tiles in which the iso-values were found, in words
-    unsure  reason why a build calls its iso-value unsure; empty if it is clear or given
+    no_surface_reason  reason why a build makes no surface; empty if it makes one
+    basis              the tiles in which the iso-values were found, in words
+    unsure             reason why a build calls its iso-value unsure; empty if it is clear or given
     """
 
     candidates: list[Candidate]
-    doubt: str
+    no_surface_reason: str
     basis: str
     unsure: str = ""
 
@@ -218,7 +218,7 @@ def table(result: Preview) -> list[str]:
 def _note(result: Preview) -> str:
     """Return the line that says what a build does, and in which tiles this was found."""
     if not any(c.is_chosen for c in result.candidates):
-        return f"a build makes no surface: {result.doubt}; {result.basis}"
+        return f"a build makes no surface: {result.no_surface_reason}; {result.basis}"
     marks = " (b: the background)" if any(c.above for c in result.candidates) else ""
     unsure = f" and calls it unsure: {result.unsure}" if result.unsure else ""
     return f"* a build uses this one{unsure}{marks}; {result.basis}"
@@ -258,22 +258,22 @@ def _candidates(
         raw = level + below if above else level
         return Candidate(name, level, above, raw, float(inside), confidence, chosen, setting)
 
-    ladder = () if found.levels is None else found.levels.all_levels
+    all_levels = () if found.levels is None else found.levels.all_levels
     value = chosen.value
     candidates = []
     if value is not None:
         is_given, name = given_level(plan, channel) is not None, plan.settings.isovalue.criterion
         if is_given:
             name = "given"
-        elif channel.rung or name == LADDER:
-            name = channel.rung or plan.settings.isovalue.rung
+        elif channel.level or name == LEVELS:
+            name = channel.level or plan.settings.isovalue.level
         setting = take(plan, channel, value, above=found.subtracts) if is_given else ""
         candidates.append(candidate(name, value, found.subtracts, chosen.confidence, setting, True))
     threshold = found.window.statistics.threshold
     for other in find_other_levels(
         plan,
         channel,
-        ladder,
+        all_levels,
         subtracts=False if found.levels is None else found.levels.subtracts,
         taken=value,
         threshold=None if threshold is None or found.reason else threshold.value,

@@ -220,10 +220,10 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
 def _candidates(found: ChannelSurvey) -> dict[str, Any] | None:
     """Return the iso-values that were found, with their histogram; None where there are none."""
     curve, level = found.curve, found.appearance.level
-    if curve is None or len(curve.values) < 2 or not found.ladder:
+    if curve is None or len(curve.values) < 2 or not found.levels:
         return None
     along = np.linspace(0, 1, len(curve.values))
-    places = {one.value: float(np.interp(one.value, curve.values, along)) for one in found.ladder}
+    places = {one.value: float(np.interp(one.value, curve.values, along)) for one in found.levels}
     taken = [] if level is None else [float(np.interp(level.iso, curve.values, along))]
     return {
         "chart": charts.candidates(curve.heights, taken=taken, others=list(places.values())),
@@ -234,7 +234,7 @@ def _candidates(found: ChannelSurvey) -> dict[str, Any] | None:
                 "reason": one.why_unclear,
                 "taken": level is not None and one.value == level.iso,
             }
-            for one in found.ladder
+            for one in found.levels
         ],
     }
 
@@ -266,7 +266,7 @@ def _others(facts: Facts, channel: Channel, found: ChannelSurvey) -> list[dict[s
         for other in find_other_levels(
             facts.plan,
             channel,
-            found.ladder,
+            found.levels,
             subtracts=found.statistics.background is not None,
             taken=None if found.appearance.level is None else found.appearance.level.iso,
             threshold=found.appearance.threshold,

@@ -29,7 +29,7 @@ from stereocell.inbox.inbox import Inbox
 from stereocell.inbox.item import ID, Item
 from stereocell.inbox.item_build import ItemBuild
 from stereocell.inbox.lines import status_of
-from stereocell.inbox.preparing import look
+from stereocell.inbox.preparing import view_item
 from stereocell.inbox.refused import RefusedError
 from stereocell.inbox.work import Work
 from stereocell.live.show_source import Live
@@ -193,7 +193,8 @@ class InboxApp:
         return _json({}, 202)
 
     async def _look(self, _: Request, item: Item) -> Response:
-        return _json({"page": await anyio.to_thread.run_sync(look, self._inbox, item, self._page)})
+        page = await anyio.to_thread.run_sync(view_item, self._inbox, item, self._page)
+        return _json({"page": page})
 
     async def _build(self, request: Request, item: Item) -> Response:
         content = await _content_of(request, default={})

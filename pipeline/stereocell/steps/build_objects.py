@@ -246,10 +246,10 @@ def _facts(
     thin: NDArray[np.uint64],
 ) -> ObjectFacts:
     labels = names.labels[owned]
-    beside = names.labels[built.walls[:, 1]]
-    own = labels[built.walls[:, 0]] == beside  # interfaces between pieces of the same object
-    cut_um2 = np.bincount(built.walls[own, 0], built.wall_um2[own], len(owned))
-    pairs = np.stack([built.walls[:, 0].astype(np.uint64), beside], axis=1)[~own]
+    beside = names.labels[built.interfaces[:, 1]]
+    own = labels[built.interfaces[:, 0]] == beside  # interfaces between pieces of the same object
+    cut_um2 = np.bincount(built.interfaces[own, 0], built.interface_um2[own], len(owned))
+    pairs = np.stack([built.interfaces[:, 0].astype(np.uint64), beside], axis=1)[~own]
     found, which = np.unique(pairs, axis=0, return_inverse=True)
     voxels = np.bincount(compact.ravel(), minlength=len(names.labels))[owned]
     is_piece = names.tiles[owned] >= 0
@@ -267,7 +267,7 @@ def _facts(
         built.areas_um2 - cut_um2,
         found[:, 0].astype(np.int32),
         found[:, 1],
-        np.bincount(which.ravel(), built.wall_um2[~own], len(found)).astype(np.float64),
+        np.bincount(which.ravel(), built.interface_um2[~own], len(found)).astype(np.float64),
         means,
         p95s,
         np.flatnonzero(is_piece).astype(np.int32),

@@ -33,6 +33,8 @@ from stereocell.storage.workspace import fetch
 SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
 _RECORD, _CLOSED, _SECONDS = "unit.json", "closed.stl", "seconds.json"
 _VOLUME, _MEASURED, _OBJECTS = "volume.npy", "measured.npy", "objects.npz"
+# Names in objects.npz of fields of ObjectFacts that are called otherwise there.
+_NAMES_IN_FILE = {"interface_objects": "walls", "interface_um2": "wall_um2"}
 
 
 def save_unit(directory: Path, unit: Unit) -> None:
@@ -188,7 +190,7 @@ def load_objects(directory: Path) -> ObjectFacts:
             _as_written(directory, directory / _OBJECTS).open("rb") as file,
             np.load(file) as arrays,
         ):
-            found = {field.name: arrays[field.name] for field in fields(ObjectFacts)}
+            found = {name: arrays[_NAMES_IN_FILE.get(name, name)] for name in _names_of_facts()}
     except (OSError, ValueError, LookupError, EOFError, BadZipFile) as error:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
     bias = tuple(float(share) for share in found.pop("bias"))
@@ -197,7 +199,14 @@ def load_objects(directory: Path) -> ObjectFacts:
 
 
 def _facts(objects: ObjectFacts) -> dict[str, NDArray[Any]]:
-    return {field.name: np.asarray(getattr(objects, field.name)) for field in fields(ObjectFacts)}
+    return {
+        _NAMES_IN_FILE.get(name, name): np.asarray(getattr(objects, name))
+        for name in _names_of_facts()
+    }
+
+
+def _names_of_facts() -> tuple[str, ...]:
+    return tuple(field.name for field in fields(ObjectFacts))
 
 
 def _load_voxels(directory: Path, name: str) -> NDArray[Any]:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from stereocell.engine.step import Document, Step, content_of
 from stereocell.model.channel import PaintColors
-from stereocell.model.object_table import ObjectTable, SharedWalls
+from stereocell.model.object_table import ObjectTable, SharedInterfaces
 from stereocell.model.tile_content import ChannelContent, TileContent
 from stereocell.steps.unit_files import (
     find_closed,
@@ -46,7 +46,7 @@ class TableOfTile:
 
     labels_id: str
     table: ObjectTable
-    touching: SharedWalls
+    touching: SharedInterfaces
 
     def key_content(self) -> list[object]:
         """Return the content for a key: digests of the table and of the interfaces."""
@@ -131,8 +131,8 @@ class WriteStageTile(Step[StageTile]):
         )
 
 
-def _digest(walls: SharedWalls) -> str:
-    return hashlib.sha256(walls.labels.tobytes() + walls.area_um2.tobytes()).hexdigest()
+def _digest(interfaces: SharedInterfaces) -> str:
+    return hashlib.sha256(interfaces.labels.tobytes() + interfaces.area_um2.tobytes()).hexdigest()
 
 
 def digest_of_table(table: ObjectTable) -> str:

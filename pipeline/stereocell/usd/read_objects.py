@@ -9,7 +9,7 @@ from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
-from stereocell.model.object_table import Column, SharedWalls
+from stereocell.model.object_table import Column, SharedInterfaces
 from stereocell.usd.layer import PAINTED_BY
 from stereocell.usd.primvar_names import OBJECT_ID
 from stereocell.usd.specimen import specimen_of
@@ -41,7 +41,7 @@ class TileObjects:
     labels: NDArray[np.uint64]
     names: tuple[str, ...]
     values: dict[str, NDArray[np.float32]]
-    touching: SharedWalls
+    touching: SharedInterfaces
 
 
 def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] | None:
@@ -167,7 +167,7 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
         np.array(list(labels), np.uint64)[shown],
         tuple(name for name, is_shown in zip(names, shown, strict=False) if is_shown),
         {name: column[shown] for name, column in values.items()},
-        SharedWalls(pairs.reshape(-1, 2), np.array(areas, np.float32)),
+        SharedInterfaces(pairs.reshape(-1, 2), np.array(areas, np.float32)),
     )
 
 

@@ -15,7 +15,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.mesh import Mesh
-from stereocell.model.object_table import Column, ObjectTable, SharedWalls
+from stereocell.model.object_table import Column, ObjectTable, SharedInterfaces
 from stereocell.objects.table import color_objects
 from stereocell.usd.layer import CLASSES, set_attribute
 from stereocell.usd.preview_surface import define_surface
@@ -80,7 +80,7 @@ def define_objects(
     look: Sdf.Path,
     channel_id: str,
     table: ObjectTable,
-    touching: SharedWalls | None,
+    touching: SharedInterfaces | None,
 ) -> None:
     """Write the data of objects that all levels share: labels, names, interfaces, class materials.
 

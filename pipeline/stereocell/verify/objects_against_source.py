@@ -40,7 +40,7 @@ from stereocell.usd.read_levels import mesh_at, read_lods
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
 from stereocell.usd.read_stage import loaded, open_stage
 from stereocell.verify.check_line import raise_on
-from stereocell.verify.shared_walls import (
+from stereocell.verify.shared_interfaces import (
     NO_SURFACES,
     Surfaces,
     find_surfaces,
@@ -94,7 +94,7 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
     found = engine.run("stage", _read_tile, tasks)
     problems = _odd_intensities(plan, labels, located, table, engine)
     cut = located.extents.labels[located.owners == CUT]
-    problems += _odd_walls(labels, table, [tile[2:] for tile in found], cut)
+    problems += _odd_interfaces(labels, table, [tile[2:] for tile in found], cut)
     worst: list[float] = []
     for tile, (there, volumes, surfaces, largest_um) in zip(plan.tiles, found, strict=True):
         problems += [f"{tile.id}/{labels.id}: {one}" for one in _odd(table, tile.id, there)]
@@ -140,7 +140,7 @@ def _boxes_beyond(table: ObjectTable, margin_um: float) -> dict[str, NDArray[np.
     }
 
 
-def _odd_walls(
+def _odd_interfaces(
     labels: Labels,
     table: ObjectTable,
     tiles: Sequence[tuple[Surfaces, float]],
@@ -157,7 +157,7 @@ def _odd_walls(
     odd: dict[str, list[int]] = {"neighbours": [], "contact": []}
     row_of = {label: row for row, label in enumerate(table.labels.tolist())}
     known = {column.id: column.values for column in table.columns}
-    for (surfaces, largest_um), walls_um2 in zip(tiles, shared, strict=True):
+    for (surfaces, largest_um), interfaces_um2 in zip(tiles, shared, strict=True):
         rows = np.array([row_of.get(label, -1) for label in surfaces.labels.tolist()], np.int64)
         there = rows >= 0  # `_odd` reports the other objects
         names, rows = surfaces.labels[there], rows[there]
@@ -165,7 +165,7 @@ def _odd_walls(
         odd["neighbours"] += names[known["neighbours"][rows] != counts].tolist()
         radius = np.cbrt(3 * known["volume_um3"][rows] / (4 * np.pi))
         most = 2 * largest_um / radius + _ROUGH
-        share = walls_um2[there] / np.maximum(surfaces.area_um2[there], 1e-12)
+        share = interfaces_um2[there] / np.maximum(surfaces.area_um2[there], 1e-12)
         off = np.abs(known["contact"][rows] - share) > most
         odd["contact"] += names[off & ~np.isin(names, cut)].tolist()
     return [

@@ -52,7 +52,7 @@ class Run:
     scene: str
     camera: str
     setting: float
-    says: str  # name of the row in the table
+    label: str  # name of the row in the table
     voxels: float | None  # step length, if the renderer doesn't count its steps
     shading: bool = False
 
@@ -68,9 +68,9 @@ class Timing(TypedDict):
 def runs_on(scene: str) -> list[Run]:
     """Return the runs on a scene."""
 
-    def run(renderer: str, camera: str, setting: float, says: str, step: float | None) -> Run:
+    def run(renderer: str, camera: str, setting: float, label: str, step: float | None) -> Run:
         name = f"{scene}-{renderer}-{camera}-{setting:g}"
-        return Run(name, renderer, scene, camera, setting, says, step)
+        return Run(name, renderer, scene, camera, setting, label, step)
 
     peers = [
         *(run("vtk", "perspective", h, f"vtk.js, step {h:g}", h) for h in (1, 0.5, 0.25)),
@@ -102,8 +102,8 @@ def runs_on_head(scene: str) -> list[Run]:
         ("ours", "perspective", 0, "ours"),
     ]
     return [
-        Run(f"{scene}-{renderer}-{camera}-{setting}", renderer, scene, camera, setting, says, 1)
-        for renderer, camera, setting, says in given
+        Run(f"{scene}-{renderer}-{camera}-{setting}", renderer, scene, camera, setting, label, 1)
+        for renderer, camera, setting, label in given
     ]
 
 
@@ -114,7 +114,7 @@ def head_row(run: Run, timings: dict[str, Timing], folder: Path) -> str:
     rival = timings[f"{run.scene}-ours-{RIVALS.get(run.camera, run.camera)}-0"]["ms"]
     ratio = statistics.median(its / ours for its, ours in zip(ms, rival, strict=True))
     median = statistics.median(ms)
-    return f"{run.scene:15} {run.says:32} {run.camera:12} {median:7.0f} {ratio:7.2f}"
+    return f"{run.scene:15} {run.label:32} {run.camera:12} {median:7.0f} {ratio:7.2f}"
 
 
 def missing() -> str | None:
@@ -172,7 +172,7 @@ def row(run: Run, scene: Scene, timings: dict[str, Timing], folder: Path) -> str
         pairs = zip(timing["ms"], rival["ms"], strict=True)
         ratio = f"{statistics.median(its / ours for its, ours in pairs):.2f}"
     text = (
-        f"{run.scene:15} {run.says:32} {run.camera:12} {ms:7.0f} {ratio:>7} {samples:>8} "
+        f"{run.scene:15} {run.label:32} {run.camera:12} {ms:7.0f} {ratio:>7} {samples:>8} "
         f"{psnr(found, expected):7.1f} {psnr(found, expected, there):7.1f} "
         f"{psnr_of_opacity(found, ideal[..., 3], scene.block.colors[0], adds_light=is_ours):>7}"
     )

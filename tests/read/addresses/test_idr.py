@@ -77,8 +77,8 @@ def test_the_newest_existing_version_is_read(resource: Service, file: str) -> No
 def test_an_image_without_ome_zarr_is_refused(resource: Service) -> None:
     with pytest.raises(SourceError, match=r"no OME-Zarr at .*v0\.5 to v0\.1.*ome-ngff-samples"):
         resolve(f"{PAGE}/iviewer/?images={ID}")
-    looked = [path for path in resource.paths if path.startswith("/idr/zarr/")]
-    assert len(looked) == 3 * 3 + 2
+    requested = [path for path in resource.paths if path.startswith("/idr/zarr/")]
+    assert len(requested) == 3 * 3 + 2
     assert not any(path.startswith("/second") for path in resource.paths)
 
 

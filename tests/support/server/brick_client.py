@@ -22,7 +22,7 @@ from support.server.brick_decoder import decode_brick, decode_frame
 
 @dataclass
 class ClientTree:
-    said: dict
+    message: dict
     raw: bytearray
     table: Table | None = None
     frames: dict[int, bytes] = field(default_factory=dict)  # zstd frames by node
@@ -31,7 +31,7 @@ class ClientTree:
 @dataclass
 class BrickClient:
     trees: dict[int, ClientTree] = field(default_factory=dict)
-    said: list[dict] = field(default_factory=list)
+    messages: list[dict] = field(default_factory=list)
     done: dict[int, dict] = field(default_factory=dict)
     order: list[tuple[int, int, int]] = field(default_factory=list)  # view, tree, node
     brick_bytes: int = 0
@@ -59,7 +59,7 @@ class BrickClient:
         return [{"type": "ack", "sequence": frame.sequence}]
 
     def _take_text(self, message: dict, tables: dict[str, bytes]) -> list[dict]:
-        self.said.append(message)
+        self.messages.append(message)
         if message["type"] == "tree":
             tree = self.trees[message["tree"]] = ClientTree(message, bytearray())
             if not message["table_follows"]:
@@ -72,8 +72,8 @@ class BrickClient:
 
     @staticmethod
     def _parse(tree: ClientTree) -> None:
-        if len(tree.raw) == tree.said["table_bytes"]:
-            assert content_hash(bytes(tree.raw)).hex() == tree.said["table"]
+        if len(tree.raw) == tree.message["table_bytes"]:
+            assert content_hash(bytes(tree.raw)).hex() == tree.message["table"]
             tree.table = parse_table(bytes(tree.raw))
 
     def is_ready(self, tree: int) -> bool:

@@ -63,10 +63,10 @@ def converse(stream: socket.socket, data: bytes, is_whole: Callable[[bytes], boo
     Returns early after a whole answer if nothing is left to send. Raises TimeoutError if
     the server neither answers nor ends the connection.
     """
-    said, left = b"", memoryview(data)
+    received, left = b"", memoryview(data)
     end = time.monotonic() + WAIT_S
     stream.setblocking(False)
-    while not (left.nbytes == 0 and is_whole(said)):
+    while not (left.nbytes == 0 and is_whole(received)):
         rest = end - time.monotonic()
         if rest < 0:
             raise TimeoutError(f"no end after {WAIT_S:g} s")
@@ -77,31 +77,31 @@ def converse(stream: socket.socket, data: bytes, is_whole: Callable[[bytes], boo
                 part = stream.recv(1 << 16)
                 if not part:
                     break
-                said += part
+                received += part
             with suppress(BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
                 if left:
                     left = left[stream.send(left[: 1 << 16]) :]
         except (ConnectionError, ssl.SSLError):
             break
-    return said
+    return received
 
 
-def is_answer(said: bytes) -> bool:
+def is_answer(received: bytes) -> bool:
     """Return whether an HTTP answer on an open connection has arrived with its body."""
-    head, _, body = said.partition(b"\r\n\r\n")
+    head, _, body = received.partition(b"\r\n\r\n")
     fields = dict(line.lower().split(b": ", 1) for line in head.split(b"\r\n")[1:] if b": " in line)
     is_kept = fields.get(b"connection") != b"close" and b"content-length" in fields
     return is_kept and len(body) >= int(fields[b"content-length"])
 
 
-def judge(said: bytes) -> str:
+def judge(received: bytes) -> str:
     """Return the status of the last answer, or a description of a fault in one of the answers."""
-    if not said:
+    if not received:
         return "closed"
-    if SECRET in said:
-        return "it told what lies outside"
+    if SECRET in received:
+        return "the answer shows a file outside of the bundle"
     statuses = []
-    for answer in said.split(b"HTTP/1.1 ")[1:]:
+    for answer in received.split(b"HTTP/1.1 ")[1:]:
         head = answer.partition(b"\r\n\r\n")[0].lower()
         statuses.append(head[:3].decode())
         missing = [one.decode() for one in PROTECTION if one not in head]
@@ -109,7 +109,7 @@ def judge(said: bytes) -> str:
             return f"{statuses[-1]} without {missing[0]}"
         if b"\r\nserver:" in head or b"uvicorn" in head:
             return f"{statuses[-1]} with a banner"
-    return statuses[-1] if statuses else f"{said[:20]!r}"
+    return statuses[-1] if statuses else f"{received[:20]!r}"
 
 
 def get(path: str, *headers: str, method: str = "GET", host: str = "localhost") -> bytes:
@@ -125,10 +125,10 @@ def raw(data: bytes, count: int = 1) -> Callable[[Target], str]:
             filled = data.replace(b"{port}", str(target.server.port).encode())
             if target.server.gate is not None:
                 filled = filled.replace(b"{token}", target.server.gate.token.encode())
-            said = converse(stream, filled, is_answer)
-        if said.count(b"HTTP/1.1 ") > count:
-            return f"{said.count(b'HTTP/1.1 ')} answers to {count} request"
-        return judge(said)
+            received = converse(stream, filled, is_answer)
+        if received.count(b"HTTP/1.1 ") > count:
+            return f"{received.count(b'HTTP/1.1 ')} answers to {count} request"
+        return judge(received)
 
     return act
 
@@ -138,9 +138,9 @@ def bare(data: bytes) -> Callable[[Target], str]:
 
     def act(target: Target) -> str:
         with target.dial() as stream:
-            said = converse(stream, data, lambda said: False)
-        _, _, body = said.partition(b"\r\n\r\n")
-        return f"a body of {len(body)} bytes" if body else judge(said)
+            received = converse(stream, data, lambda received: False)
+        _, _, body = received.partition(b"\r\n\r\n")
+        return f"a body of {len(body)} bytes" if body else judge(received)
 
     return act
 
@@ -152,10 +152,10 @@ def landing(path: str) -> Callable[[Target], str]:
         assert target.server.gate is not None
         head = get(path.replace("{token}", target.server.gate.token))
         with target.dial() as stream:
-            said = converse(stream, head, is_answer)
-        if (status := judge(said)) != "303":
+            received = converse(stream, head, is_answer)
+        if (status := judge(received)) != "303":
             return status
-        place = re.search(rb"^location: (.*)\r$", said, re.IGNORECASE | re.MULTILINE)
+        place = re.search(rb"^location: (.*)\r$", received, re.IGNORECASE | re.MULTILINE)
         assert place is not None
         shown = re.sub(r"[\t\r\n]", "", place[1].decode()).replace("\\", "/")
         base = urlsplit(target.server.address)
@@ -173,7 +173,7 @@ def slowly(first: bytes, drip: bytes) -> Callable[[Target], str]:
 
     def act(target: Target) -> str:
         with target.dial() as stream:
-            said = converse(stream, first, is_answer) if first else b""
+            received = converse(stream, first, is_answer) if first else b""
             stream.settimeout(0.05)
             end = time.monotonic() + WAIT_S
             for place in range(len(drip)):
@@ -181,7 +181,7 @@ def slowly(first: bytes, drip: bytes) -> Callable[[Target], str]:
                     stream.send(drip[place : place + 1])
                     if not (part := stream.recv(1000)):
                         return "closed" if time.monotonic() < end else "still open"
-                    said += part
+                    received += part
                 except TimeoutError:
                     continue
                 except ConnectionError:
@@ -268,23 +268,27 @@ def open_socket(target: Target) -> tuple[socket.socket, bytes]:
     """Return a stream with an open websocket, and the bytes that followed the handshake."""
     stream = target.dial()
     stream.sendall(handshake().replace(b"{port}", str(target.server.port).encode()))
-    said = b""
-    while b"\r\n\r\n" not in said:
-        said += stream.recv(4096)
-    head, _, rest = said.partition(b"\r\n\r\n")
+    received = b""
+    while b"\r\n\r\n" not in received:
+        received += stream.recv(4096)
+    head, _, rest = received.partition(b"\r\n\r\n")
     found = judge(head)
     if found != "101":
         raise ValueError(found)
     return stream, rest
 
 
-def closing(said: bytes) -> str:
+def closing(received: bytes) -> str:
     """Return the code of the close frame among the server's frames."""
-    while len(said) >= 2:
-        size, at = said[1] & 127, 2
+    while len(received) >= 2:
+        size, at = received[1] & 127, 2
         if size == 126:
-            size, at = int.from_bytes(said[2:4], "big"), 4
-        payload, said, opcode = said[at : at + size], said[at + size :], said[0] & 15
+            size, at = int.from_bytes(received[2:4], "big"), 4
+        payload, received, opcode = (
+            received[at : at + size],
+            received[at + size :],
+            received[0] & 15,
+        )
         if opcode == 8:
             return str(int.from_bytes(payload[:2], "big"))
     return "closed"
@@ -297,7 +301,7 @@ def framed(*frames: bytes) -> Callable[[Target], str]:
         stream, first = open_socket(target)
         with stream:
             rest = converse(
-                stream, b"".join(frames), lambda said: closing(first + said) != "closed"
+                stream, b"".join(frames), lambda received: closing(first + received) != "closed"
             )
         return closing(first + rest)
 

@@ -30,7 +30,7 @@ def sent(
         while opened < len(volumes):
             for answer in client.take(socket.recv()):
                 say(**answer)
-            errors = sum(one["type"] == "error" for one in client.said)
+            errors = sum(one["type"] == "error" for one in client.messages)
             opened = errors + sum(client.is_ready(tree) for tree in client.trees)
         if client.trees:
             (low, high), middle = np.array(box, float), np.mean(box, axis=0)

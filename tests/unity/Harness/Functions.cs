@@ -62,7 +62,7 @@ static class Functions
         Program.Send(window, "OnGUI");
         return new JObject(
             new JProperty("drawn", new JArray(EditorGUILayout.Drawn)),
-            new JProperty("said", window.WriteLayer(layer, stage)),
+            new JProperty("message", window.WriteLayer(layer, stage)),
             new JProperty("imported", Dumping.Dump(specimen.table)),
             new JProperty("shown", Dumping.Dump(specimen.Table)));
     }

@@ -445,7 +445,7 @@ def as_staged(context, root):
     try:
         yield
     finally:
-        meant = kept(root).get(channel, {})
-        default = meant.get("default")
+        edits = kept(root).get(channel, {})
+        default = edits.get("default")
         if default is not None:
             _show(context, channel, described, COLOR if default == "" else default)

@@ -46,8 +46,8 @@ class Edits:
     lost: list[str]
 
     def summary(self):
-        told = f"{len(self.carried)} edits: " + "; ".join(self.carried)
-        return f"{told}. Not carried: " + "; ".join(self.lost) if self.lost else told
+        carried = f"{len(self.carried)} edits: " + "; ".join(self.carried)
+        return f"{carried}. Not carried: " + "; ".join(self.lost) if self.lost else carried
 
 
 def export_edits(context, path):
@@ -341,24 +341,24 @@ def _write_points(layer, stage, state, objects, lost):
 def _write_objects(layer, stage, root, objects):
     """Write the edits of the objects of label maps, and yield one line for each."""
     kind = Sdf.ValueTypeNames
-    for channel, meant in kept(root).items():
+    for channel, edits in kept(root).items():
         path = f"{CHANNELS}/{channel}"
         prim = stage.GetPrimAtPath(path)
-        default = meant.get("default")
+        default = edits.get("default")
         if default is not None and default != prim.GetAttribute("stereocell:defaultColumn").Get():
             set_value(layer, path, "stereocell:defaultColumn", kind.Token, default)
             yield f"{channel}: coloured by {default or 'the objects alone'}"
-        if hidden := meant.get("hidden"):
+        if hidden := edits.get("hidden"):
             labels = Vt.UInt64Array([int(label) for label in hidden])
             set_value(layer, path, "stereocell:hiddenObjects", kind.UInt64Array, labels)
             yield f"{channel}: {len(hidden)} objects hidden"
-        for column, names in meant.get("classes", {}).items():
+        for column, names in edits.get("classes", {}).items():
             name = f"stereocell:column:{column}"
             set_value(layer, path, name, kind.String, prim.GetAttribute(name).Get())
             spec = layer.GetAttributeAtPath(f"{path}.{name}")
             spec.customData = {"categories": Vt.StringArray(names)}
             yield f"{channel}: names of {column}"
-        yield from _write_colors(layer, stage, channel, meant.get("colors", {}), objects)
+        yield from _write_colors(layer, stage, channel, edits.get("colors", {}), objects)
 
 
 def _write_colors(layer, stage, channel, colors, objects):

@@ -84,10 +84,10 @@ namespace StereoCell.Editor
         {
             this.folder = folder;
             var manifest = Parse("manifest.json", ReadFile("manifest.json"));
-            if ((string)Member(manifest, "format") != Format) throw new BundleException("manifest.json: format is " + manifest["format"] + "; expected " + Format + ". Choose the folder of a StereoCell bundle.");
+            if ((string)Member(manifest, "format") != Format) throw new BundleException("manifest.json: format is " + manifest["format"] + ", expected " + Format + ": choose the folder of a StereoCell bundle");
             if ((int)Member(manifest, "version") != Version)
             {
-                throw new BundleException("manifest.json: version is " + Member(manifest, "version") + "; expected " + Version + ". Use the package of the StereoCell version that built the bundle.");
+                throw new BundleException("manifest.json: version is " + Member(manifest, "version") + ", expected " + Version + ": use the package of the StereoCell version that built the bundle");
             }
             var index = (JObject)Member(manifest, "files");
             files = Parse("files.json", Checked((string)Member(index, "path"), index));
@@ -126,7 +126,7 @@ namespace StereoCell.Editor
         byte[] Checked(string path, JObject entry)
         {
             var data = ReadFile(path);
-            if (data.Length != (long)entry["bytes"]) throw new BundleException(path + ": size is " + data.Length + " bytes; expected " + entry["bytes"] + ". Copy or build the bundle again.");
+            if (data.Length != (long)entry["bytes"]) throw new BundleException(path + ": size is " + data.Length + " bytes, expected " + entry["bytes"] + ": copy or build the bundle again");
             using (var sha256 = SHA256.Create())
             {
                 var found = BitConverter.ToString(sha256.ComputeHash(data)).Replace("-", "").ToLowerInvariant();
@@ -138,7 +138,7 @@ namespace StereoCell.Editor
         byte[] ReadFile(string path)
         {
             var isOutside = Path.IsPathRooted(path) || path.Contains("\\") || Array.IndexOf(path.Split('/'), "..") >= 0;
-            if (isOutside) throw new BundleException(path + " leads out of the bundle; expected a path inside its folder. Build the bundle again.");
+            if (isOutside) throw new BundleException(path + " leads out of the bundle, expected a path inside its folder: build the bundle again");
             return folder.Read(path);
         }
 
@@ -166,7 +166,7 @@ namespace StereoCell.Editor
         /// <summary>Check an identifier by the pattern of the bundle's schema: it becomes part of file names.</summary>
         static string Identifier(string id)
         {
-            if (!Regex.IsMatch(id, "^[A-Za-z_][A-Za-z0-9_]*$")) throw new BundleException(id + " is not an identifier of a tile or channel; expected letters, digits and underscores. Build the bundle again.");
+            if (!Regex.IsMatch(id, "^[A-Za-z_][A-Za-z0-9_]*$")) throw new BundleException(id + " is not an identifier of a tile or channel, expected letters, digits and underscores: build the bundle again");
             return id;
         }
 

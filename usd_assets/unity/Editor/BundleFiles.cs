@@ -58,7 +58,7 @@ namespace StereoCell.Editor
             var found = zip.Entries.Where(entry => entry.Name == First).OrderBy(entry => entry.FullName.Length).FirstOrDefault();
             if (found != null) return new BundleFiles(zip, found.FullName.Substring(0, found.FullName.Length - First.Length));
             zip.Dispose();
-            throw new BundleException(asset + ": the zip file has no manifest.json; expected a zip file of a bundle. Copy the bundle again.");
+            throw new BundleException(asset + ": the zip file has no manifest.json, expected a zip file of a bundle: copy the bundle again");
         }
 
         public static BundleFiles OpenFolder(string folder)
@@ -72,17 +72,17 @@ namespace StereoCell.Editor
             using (var stream = File.OpenRead(asset))
             {
                 if (stream.ReadByte() == 'P' && stream.ReadByte() == 'K') return null;
-                if (stream.Length > MostOfLink) throw new BundleException(asset + ": found another file; expected a zip file of a bundle, or a link to its folder.");
+                if (stream.Length > MostOfLink) throw new BundleException(asset + ": found another file, expected a zip file of a bundle, or a link to its folder.");
             }
             try
             {
                 var named = (string)JObject.Parse(File.ReadAllText(asset, Encoding.UTF8))["bundle"];
-                if (string.IsNullOrEmpty(named)) throw new BundleException(asset + ": the link names no folder; expected {\"bundle\": \"the bundle's folder\"}.");
+                if (string.IsNullOrEmpty(named)) throw new BundleException(asset + ": the link names no folder, expected {\"bundle\": \"the bundle's folder\"}.");
                 return Path.GetFullPath(Path.Combine(Path.GetDirectoryName(Path.GetFullPath(asset)), named));
             }
             catch (JsonException)
             {
-                throw new BundleException(asset + ": found another file; expected a zip file of a bundle, or {\"bundle\": \"the bundle's folder\"}.");
+                throw new BundleException(asset + ": found another file, expected a zip file of a bundle, or {\"bundle\": \"the bundle's folder\"}.");
             }
         }
 

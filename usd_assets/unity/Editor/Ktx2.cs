@@ -32,7 +32,7 @@ namespace StereoCell.Editor
             var levels = BitConverter.ToInt32(data, 40);
             if (Components == 0 || BitConverter.ToInt32(data, 44) != ZstdScheme)
             {
-                throw new InvalidDataException("the texture has VK_FORMAT " + format + "; expected R8 or RGBA8 texels, compressed by zstd");
+                throw new InvalidDataException("the texture has VK_FORMAT " + format + ", expected R8 or RGBA8 texels, compressed by zstd");
             }
             if (level < 0 || level >= levels || data.Length < Head + 24 * levels) throw new InvalidDataException("the texture has no level " + level);
             Width = Math.Max(1, BitConverter.ToInt32(data, 20) >> level);

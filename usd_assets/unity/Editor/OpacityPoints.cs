@@ -117,7 +117,7 @@ namespace StereoCell.Editor
             var keys = gradient.colorKeys;
             foreach (var key in keys)
             {
-                if (key.color != keys[0].color) throw new ArgumentException("found several colours; expected one, because a channel has one colour in the stage.");
+                if (key.color != keys[0].color) throw new ArgumentException("found several colours, expected one, because a channel has one colour in the stage.");
             }
             return keys[0].color;
         }

@@ -41,7 +41,7 @@ namespace StereoCell.Editor
             this.bundle = bundle;
             this.options = options;
             var shader = Shader.Find(ShaderName);
-            if (shader == null) throw new BundleException("the shader " + ShaderName + " is not in the project; expected " + ShaderPath + ". Install the package again.");
+            if (shader == null) throw new BundleException("the shader " + ShaderName + " is not in the project, expected " + ShaderPath + ": install the package again");
             table = MakeTable();
             addAsset("transfer functions", table);
             surfaces = new SurfaceBuilder(bundle, options, ownMaterial, addAsset);
@@ -105,7 +105,7 @@ namespace StereoCell.Editor
                 var found = new Ktx2(bundle.Read(channel.Table), 0);
                 if (found.Width != Entries || found.Height != channel.Functions.Length || found.Components != 4)
                 {
-                    throw new BundleException(channel.Table + ": size is " + found.Width + " x " + found.Height + " texels; expected " + Entries + " x " + channel.Functions.Length + " RGBA texels. Build the bundle again.");
+                    throw new BundleException(channel.Table + ": size is " + found.Width + " x " + found.Height + " texels, expected " + Entries + " x " + channel.Functions.Length + " RGBA texels: build the bundle again");
                 }
                 rows.AddRange(found.Texels);
             }

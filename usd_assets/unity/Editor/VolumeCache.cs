@@ -50,7 +50,7 @@ namespace StereoCell.Editor
                     var first = volumes[0];
                     if (volumes.Any(each => each.Width != first.Width || each.Height != first.Height || each.Depth != first.Depth || each.Components != 1))
                     {
-                        throw new BundleException(string.Join(", ", sources) + ": sizes or channels differ; expected volumes of one size with one channel each. Build the bundle again.");
+                        throw new BundleException(string.Join(", ", sources) + ": sizes or channels differ, expected volumes of one size with one channel each: build the bundle again");
                     }
                     using (var stream = File.Create(part))
                     {

@@ -98,7 +98,7 @@ namespace StereoCell
             var known = Known(channel);
             var index = Array.IndexOf(known.functions, function);
             if (index < 0) throw new ArgumentException(channel + " has no transfer function " + function);
-            if (opacity.Length != table.width) throw new ArgumentException("found " + opacity.Length + " opacities; expected " + table.width + ", one for each intensity");
+            if (opacity.Length != table.width) throw new ArgumentException("found " + opacity.Length + " opacities, expected " + table.width + ", one for each intensity");
             var texels = Table.GetRawTextureData();
             for (var i = 0; i < opacity.Length; i++) texels[4 * (table.width * (known.firstRow + index) + i) + 3] = opacity[i];
             if (ownTable == null)

@@ -33,7 +33,7 @@ namespace StereoCell
             var head = new byte[HeadBytes];
             if (ReadFully(stream, head) < HeadBytes || Encoding.ASCII.GetString(head, 0, 4) != Magic)
             {
-                throw new InvalidDataException("found another file; expected a voxel file of the StereoCell package");
+                throw new InvalidDataException("found another file, expected a voxel file of the StereoCell package");
             }
             Width = BitConverter.ToInt32(head, 4);
             Height = BitConverter.ToInt32(head, 8);

@@ -274,9 +274,9 @@ def test_a_folder_of_another_format_is_named_by_its_content(tmp_path: Path) -> N
         (tmp_path / name).write_bytes(b"")
     (tmp_path / "plate.zarr").mkdir()
     (tmp_path / "notes of JANE.txt").write_bytes(b"")
-    told = refusal(tmp_path)
-    assert "by its own name (2 NIfTI or Analyze, 1 OME-Zarr)" in told
-    assert "DOE" not in told
+    message = refusal(tmp_path)
+    assert "by its own name (2 NIfTI or Analyze, 1 OME-Zarr)" in message
+    assert "DOE" not in message
 
 
 def test_a_preamble_like_that_of_a_tiff_changes_nothing(tmp_path: Path) -> None:

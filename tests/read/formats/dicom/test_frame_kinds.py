@@ -169,10 +169,10 @@ def test_a_property_separates_slices_at_equal_positions_and_interleaved_ones(
     assert "Jane" not in "".join((*lines, *first_shown.notes))
 
 
-@pytest.mark.parametrize("told", [setting(AcquisitionNumber=2), setting()])
-def test_interleaved_acquisitions_are_two_series(tmp_path: Path, told: Change) -> None:
-    write_kind(tmp_path, 100, setting(AcquisitionNumber=1) if told.__closure__ else setting())
-    write_kind(tmp_path, 300, told, indices=[k + 0.5 for k in range(9)], first_number=30)
+@pytest.mark.parametrize("change", [setting(AcquisitionNumber=2), setting()])
+def test_interleaved_acquisitions_are_two_series(tmp_path: Path, change: Change) -> None:
+    write_kind(tmp_path, 100, setting(AcquisitionNumber=1) if change.__closure__ else setting())
+    write_kind(tmp_path, 300, change, indices=[k + 0.5 for k in range(9)], first_number=30)
     assert len(read.list_series(tmp_path)) == 2
     assert (added(tmp_path), added(tmp_path, 2)) == (100, 300)
 

@@ -133,7 +133,7 @@ def test_other_frames_of_nuclear_medicine_are_refused(
 
 
 @pytest.mark.parametrize(
-    ("kind", "frames", "told"),
+    ("kind", "frames", "expected"),
     [
         (
             SecondaryCaptureImageStorage,
@@ -145,7 +145,7 @@ def test_other_frames_of_nuclear_medicine_are_refused(
     ],
 )
 def test_an_image_without_a_position_is_named_by_its_kind(
-    tmp_path: Path, kind: str, frames: int, told: str
+    tmp_path: Path, kind: str, frames: int, expected: str
 ) -> None:
     ds = image(np.zeros((8, 8), np.uint8), grid(), 0)
     ds.SOPClassUID = ds.file_meta.MediaStorageSOPClassUID = kind
@@ -155,5 +155,5 @@ def test_an_image_without_a_position_is_named_by_its_kind(
     path = save(ds, tmp_path / "s.dcm")
     with pytest.raises(SourceError) as caught:
         read.open(path)
-    assert told in str(caught.value)
+    assert expected in str(caught.value)
     assert "found one file, " in str(caught.value)

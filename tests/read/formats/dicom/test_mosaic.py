@@ -114,7 +114,7 @@ def _without_gap(ds: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "expected"),
     [
         (_without_header, "with a mosaic of several slices, without the private header"),
         (_cut_short, "without the private header"),
@@ -124,11 +124,11 @@ def _without_gap(ds: Any) -> None:
     ],
 )
 def test_a_mosaic_without_a_position_is_refused_in_one_line(
-    tmp_path: Path, change: Callable[[Any], None], told: str
+    tmp_path: Path, change: Callable[[Any], None], expected: str
 ) -> None:
     path = write_mosaic(tmp_path / "m.dcm", affine_of(False, False), change=change)
     with pytest.raises(SourceError) as caught:
         read.open(path)
-    assert told in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
     assert "JANE" not in str(caught.value)

@@ -99,11 +99,11 @@ def test_stated_but_absent_time_points_are_noted(tmp_path: Path) -> None:
     assert "NumberOfTimeSlices states 3, but there are only 2" in notes_of(tmp_path)
 
 
-@pytest.mark.parametrize("told", ["FrameReferenceTime", "AcquisitionNumber", "InstanceNumber"])
+@pytest.mark.parametrize("tag", ["FrameReferenceTime", "AcquisitionNumber", "InstanceNumber"])
 @pytest.mark.slow
-def test_beds_that_overlap_are_one_volume_of_their_inner_slices(tmp_path: Path, told: str) -> None:
+def test_beds_that_overlap_are_one_volume_of_their_inner_slices(tmp_path: Path, tag: str) -> None:
     for bed in range(3):
-        values = {"FrameReferenceTime": None} if told == "InstanceNumber" else {told: bed + 1}
+        values = {"FrameReferenceTime": None} if tag == "InstanceNumber" else {tag: bed + 1}
         write_pet(
             tmp_path,
             10.0 * bed,

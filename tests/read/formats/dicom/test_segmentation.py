@@ -67,12 +67,12 @@ def test_a_segmentation_adds_a_line_without_its_texts_to_the_plan(
     voxels = apart() if kind == "LABELMAP" else masks()
     path = write_segmentation(tmp_path, kind, voxels)
     assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
-    told = capsys.readouterr()
-    assert "is a label map: found a DICOM segmentation of 2 segments" in told.err
-    assert "--as intensity" in told.err
+    printed = capsys.readouterr()
+    assert "is a label map: found a DICOM segmentation of 2 segments" in printed.err
+    assert "--as intensity" in printed.err
     assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--series", "list"]) == 0
     assert not {"JANE", "DOE", "lung"} & set(capsys.readouterr().out.replace("^", " ").split())
-    assert "JANE" not in told.err
+    assert "JANE" not in printed.err
 
 
 @pytest.mark.parametrize("kind", ["BINARY", "FRACTIONAL"])
@@ -105,9 +105,9 @@ def test_a_segmentation_without_a_position_is_named_as_one(
         del group.PlanePositionSequence
     ds.save_as(path)
     assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
-    told = capsys.readouterr().err
-    assert "holding a segmentation of 2 segments, without a place in the patient" in told
-    assert "expected the image that it was drawn on" in told
+    printed = capsys.readouterr().err
+    assert "holding a segmentation of 2 segments, without a place in the patient" in printed
+    assert "expected the image that it was drawn on" in printed
 
 
 @pytest.mark.parametrize("overlap", ["NO", "UNDEFINED", None])
@@ -205,9 +205,9 @@ def test_fractions_are_not_read_as_labels(
     images = str(tmp_path / "images")
     for flags in ([str(path), "--labels", "."], [images, "--labels", f"a={path}"]):
         assert main(["plan", *flags, "-o", out]) == 2
-        told = capsys.readouterr().err
-        assert "with fractions (FRACTIONAL) instead of bits or numbers" in told
-        assert "--series N --as intensity" in told
+        printed = capsys.readouterr().err
+        assert "with fractions (FRACTIONAL) instead of bits or numbers" in printed
+        assert "--series N --as intensity" in printed
     with pytest.raises(SourceError, match=r"found 0\.50.*, expected whole numbers in labels"):
         labels_of(read.open(path, series=1))
 
@@ -300,7 +300,7 @@ def moved(ds: Any, step: Sequence[float]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "told"),
+    ("spoil", "expected"),
     [
         (turned, "with planes of 2 orientations or sizes"),
         (nameless, "with frames that name no segment"),
@@ -309,10 +309,10 @@ def moved(ds: Any, step: Sequence[float]) -> None:
     ],
 )
 def test_planes_that_do_not_make_a_label_map_are_refused(
-    tmp_path: Path, spoil: Callable[[Any], None], told: str
+    tmp_path: Path, spoil: Callable[[Any], None], expected: str
 ) -> None:
     path = write_segmentation(tmp_path, "BINARY", apart(), spoil)
-    with pytest.raises(UsageError, match=told):
+    with pytest.raises(UsageError, match=expected):
         read.open(path)
 
 

@@ -71,13 +71,13 @@ def test_a_ct_whose_scale_or_values_include_air_is_in_hounsfield_units(
 
 
 @pytest.mark.parametrize(
-    ("kind", "is_told"), [("JANEDOE", True), ("US", True), ("HOUNSFIELD", False), ("HU", False)]
+    ("kind", "is_reported"), [("JANEDOE", True), ("US", True), ("HOUNSFIELD", False), ("HU", False)]
 )
 def test_a_rescale_type_other_than_hounsfield_units_is_noted(
-    tmp_path: Path, kind: str, is_told: bool
+    tmp_path: Path, kind: str, is_reported: bool
 ) -> None:
     dataset = opened(tmp_path, setting(RescaleType=kind), modality="CT", intercept=-1024)
-    assert any("RescaleType is" in note for note in dataset.notes) == is_told
+    assert any("RescaleType is" in note for note in dataset.notes) == is_reported
     assert dataset.has_hounsfield_units == (kind != "US")
     assert "JANE" not in "".join(dataset.notes)
 
@@ -170,8 +170,8 @@ def test_a_real_world_mapping_that_contradicts_the_rescale_is_noted(
 ) -> None:
     scale = (1.0, 0.0) if is_same else (0.25, 3.0)
     dataset = opened(tmp_path, setting(RealWorldValueMappingSequence=mapping(*scale)))
-    said = [note for note in dataset.notes if "RealWorldValueMapping states 0.25, 3" in note]
-    assert len(said) == len(dataset.notes) == (not is_same)
+    matching = [note for note in dataset.notes if "RealWorldValueMapping states 0.25, 3" in note]
+    assert len(matching) == len(dataset.notes) == (not is_same)
 
 
 def test_the_scale_slope_of_philips_is_noted(tmp_path: Path) -> None:

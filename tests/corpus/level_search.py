@@ -29,7 +29,7 @@ from stereocell.model.volume import Volume
 
 
 @dataclass(frozen=True)
-class Sight:
+class LevelSearch:
     """The fields, evidence and levels that the product finds for one case.
 
     field    denoised voxels, float32 (z, y, x), on which levels are found
@@ -50,7 +50,7 @@ class Sight:
     found: ChannelLevels
 
 
-def look_at(case: Case) -> Sight:
+def search_levels(case: Case) -> LevelSearch:
     """Return the fields, evidence and levels of a case."""
     voxels, truth = case.load()
     sigma = min(case.spacing_um)
@@ -100,7 +100,7 @@ def look_at(case: Case) -> Sight:
     values = denoise(volume, sigma, max_shift)
     if found.subtracts and under is not None:
         values -= under
-    return Sight(case, truth, field, above, values, padding, tiles, scale, found)
+    return LevelSearch(case, truth, field, above, values, padding, tiles, scale, found)
 
 
 def _places(shape: tuple[int, ...], grid: tuple[int, int]) -> list[Slices]:

@@ -64,11 +64,11 @@ def find_surfaces(mesh: Mesh, labels: NDArray[np.uint64], beyond: NDArray[np.flo
     first, second = _find_pairs(keys)
     other = labels[of[first]] != labels[of[second]]
     first, second = first[other], second[other]
-    walls = np.concatenate([first, second])
+    interfaces = np.concatenate([first, second])
     count = len(labels)
     pairs = np.sort(np.stack([labels[of[first]], labels[of[second]]], axis=1), axis=1)
     left = np.ones(len(keys), bool)
-    left[walls] = False
+    left[interfaces] = False
     is_near = np.zeros(len(keys), bool)
     low, high = corners.min(axis=1), corners.max(axis=1)
     for box in beyond:
@@ -77,7 +77,7 @@ def find_surfaces(mesh: Mesh, labels: NDArray[np.uint64], beyond: NDArray[np.flo
     return Surfaces(
         labels,
         np.bincount(of, area, count).astype(np.float64),
-        np.bincount(of[walls], area[walls], count).astype(np.float64),
+        np.bincount(of[interfaces], area[interfaces], count).astype(np.float64),
         np.unique(pairs, axis=0),
         keys[kept],
         of[kept],
