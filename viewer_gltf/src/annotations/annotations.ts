@@ -14,8 +14,8 @@ import {
   pickHandle,
   TOLERANCE_RAD,
 } from "../marks/clip_handles";
+import { NO_EYE_VIEW } from "../marks/eye_view";
 import { dragLamp, isLampHandle, lampHandles } from "../marks/lamp_handles";
-import { NO_SIGHT } from "../marks/sight";
 import { umPerPixelAt } from "../marks/um_per_pixel";
 import type { Box } from "../math/box";
 import type { Clip } from "../math/clip";
@@ -67,7 +67,7 @@ export class Marks {
   readonly ruler = new Ruler();
   readonly axes: Axes;
   /** The eye of the last frame. */
-  private sight = NO_SIGHT;
+  private eyeView = NO_EYE_VIEW;
   /** The dragged lamp, while the ray passes beside the sphere on which the lamp moves; otherwise null. */
   private beside: HandleId | null = null;
   /** The clip with which the page opened. */
@@ -119,7 +119,7 @@ export class Marks {
 
   /** Called for every frame, also if it is not drawn. */
   update(view: FrameView): void {
-    this.sight = view.sight;
+    this.eyeView = view.eyeView;
     this.target.specimen = view.specimen;
     this.cutAtEntry = view.screen === null ? (this.cutAtEntry ?? this.state.clip) : null;
     this.target.isCutAsleep = this.cutAtEntry === this.state.clip;
@@ -131,9 +131,9 @@ export class Marks {
     if (this.state.measured.length > 0) this.showMeasured(); // volumes load and refine, which changes the values
     if (view.screen === null) this.updateInRoom(view);
     else this.updateOnScreen(view, view.screen, m_per_um);
-    this.handles.update(this.sight);
-    this.lamps.update(this.sight);
-    this.measured.update(this.sight);
+    this.handles.update(this.eyeView);
+    this.lamps.update(this.eyeView);
+    this.measured.update(this.eyeView);
   }
 
   /** For each measured point, the loaded values of the shown channels, such as `DAPI 1210`. */
@@ -154,7 +154,7 @@ export class Marks {
   /** Returns the handle that a ray in um points at. */
   pick(ray: Ray, pointing: Pointing): HandleId | null {
     this.showHandles();
-    return pickHandle(ray, this.target.handles, this.sight.zoom * TOLERANCE_RAD[pointing]);
+    return pickHandle(ray, this.target.handles, this.eyeView.zoom * TOLERANCE_RAD[pointing]);
   }
 
   /** Drags a handle along with a ray in um. */
@@ -206,16 +206,16 @@ export class Marks {
   }
 
   private updateInRoom({ isPanelOpen, isBarBelow }: FrameView): void {
-    const { sight, shown } = this;
+    const { eyeView, shown } = this;
     this.showHandles();
     this.highlight(this.target.takeSeen());
     this.scaleBar.update(null);
     this.orientation.root.style.display = "none";
-    this.ruler.update(shown, sight, isBarBelow);
+    this.ruler.update(shown, eyeView, isBarBelow);
     if (isPanelOpen) this.ruler.group.visible = false;
     this.axes.group.visible = !isPanelOpen;
-    this.axes.update(shown, sight);
-    this.name.placeInRoom(sight);
+    this.axes.update(shown, eyeView);
+    this.name.placeInRoom(eyeView);
   }
 
   private updateOnScreen(

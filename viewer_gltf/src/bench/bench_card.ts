@@ -21,7 +21,7 @@ export type BenchOptions = Readonly<{
 
 export function benchCard(flight_s: number, options: BenchOptions): HTMLElement {
   const { subject, stereo, startStereo } = options;
-  const told = element(
+  const status = element(
     "p",
     {
       textContent:
@@ -42,7 +42,7 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
     { className: "bench", ariaLabel: "Benchmark" },
     { bench: "card" },
     element("h2", { textContent: "How fast is this device?" }),
-    told,
+    status,
     ...buttons,
   );
   buttons.forEach((button, i) => {
@@ -56,13 +56,13 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
     try {
       // Stereo is requested within the tap, since browsers allow it only then.
       const begun = kind === null ? null : await startStereo(kind).then(() => kind, refused);
-      const report = await runAll(subject, begun, flight_s, (step) => setText(told, words(step)));
+      const report = await runAll(subject, begun, flight_s, (step) => setText(status, words(step)));
       await subject.endStereo();
       options.onReport(report);
-      told.remove();
+      status.remove();
       card.append(...resultOf(report));
     } catch (error) {
-      setText(told, `The benchmark ended early: ${String(error)}`);
+      setText(status, `The benchmark ended early: ${String(error)}`);
       throw error;
     }
   };

@@ -19,6 +19,6 @@ export function allAsked(): readonly Asked[] {
 }
 
 /** Returns the requests that the host has answered. */
-export function allCome(): readonly Asked[] {
+export function allAnswered(): readonly Asked[] {
   return [...log.values()].filter(({ hasCome }) => hasCome).map(({ asked }) => asked);
 }

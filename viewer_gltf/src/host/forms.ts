@@ -149,8 +149,8 @@ export class Forms {
   }
 
   /** Called before each frame. */
-  dress(): void {
-    for (const form of this.all) form.dress?.();
+  updateMaterials(): void {
+    for (const form of this.all) form.updateMaterials?.();
   }
 
   /** Streams files for a view, down to an error on screen. */

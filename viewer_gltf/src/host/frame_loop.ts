@@ -168,7 +168,7 @@ export class FrameLoop {
     if (isWanted || gathers) {
       this.isStale = isChanging;
       this.hasNews = isFading;
-      forms.dress();
+      forms.updateMaterials();
       const { passes } = this.gathering;
       // late frames first lose their smooth edges
       const isSmooth = !isMoving || settings.steps >= MAX_STEPS;

@@ -3,7 +3,7 @@ import type { Matrix4, Object3D, PerspectiveCamera, Vector2, Vector3, WebGLRende
 import type { Bundle } from "../bundle/load";
 import type { ValuesHost } from "../bundle/values_host";
 import type { Target } from "../interaction/ray_pointer";
-import type { Sight } from "../marks/style";
+import type { EyeView } from "../marks/style";
 import type { ClipPlane } from "../math/clip";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { Lenses, PanelView, PartSection } from "../panel/controls";
@@ -56,7 +56,7 @@ export type FrameView = Readonly<{
   /** Whether the bar of stereo is below the specimen. */
   isBarBelow: boolean;
   /** The eye in the space of the specimen. */
-  sight: Sight;
+  eyeView: EyeView;
   dt_s: number;
 }>;
 
@@ -88,10 +88,10 @@ export type Tap = Readonly<{
 }>;
 
 /**
- * "used": nothing else happens; "met": the part has done something, and a tile may still be
+ * "used": nothing else happens; "shared": the part has done something, and a tile may still be
  * selected; null: no hit.
  */
-export type TapAnswer = "used" | "met" | null;
+export type TapAnswer = "used" | "shared" | null;
 
 /** Functions by the name of the command. A function that returns false leaves the command to others. */
 export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;

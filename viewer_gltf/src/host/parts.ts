@@ -108,8 +108,8 @@ export class Parts {
   }
 
   /** Passes a tap to the parts until one has used it. */
-  tap(tap: Tap): "used" | "met" | null {
-    let answer: "met" | null = null;
+  tap(tap: Tap): "used" | "shared" | null {
+    let answer: "shared" | null = null;
     for (const part of this.all) {
       const ofPart = part.tap?.(tap) ?? null;
       if (ofPart === "used") return "used";

@@ -2,7 +2,7 @@
 import { type Camera, type Matrix4, Vector3, type WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import { rayAhead } from "../interaction/rays";
-import { sightOf } from "../marks/sight";
+import { eyeViewOf } from "../marks/eye_view";
 import type { Vec3 } from "../math/vec3";
 import { type FramePace, FrameRenderer } from "../render/frame_renderer";
 import type { GazeFocus } from "../render/gaze_focus";
@@ -96,7 +96,7 @@ export class SceneFrame {
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
       isPanelOpen: stereo.isPanelOpen,
       isBarBelow: !stereo.isInUsersRoom,
-      sight: sightOf(head, group.matrixWorld, screen),
+      eyeView: eyeViewOf(head, group.matrixWorld, screen),
       dt_s,
     };
   }

@@ -51,7 +51,7 @@ export type Snapshot = Readonly<{
   /** Rotation of the specimen in the scene, a quaternion. */
   specimenTurn: readonly [number, number, number, number];
   /** Notices that are visible in stereo now. */
-  told: readonly string[];
+  stereoNotices: readonly string[];
   /** Controls of the panel in the scene now, its button first; none on a flat screen. */
   menu: readonly MenuEntry[];
 }>;
@@ -94,7 +94,7 @@ export function snapshotOf(source: SnapshotSource): Snapshot {
     isStereo: stereo.kind !== null,
     specimenAt: room.specimen.middle,
     specimenTurn: room.specimen.pose.orientation.toArray(),
-    told: stereo.notices,
+    stereoNotices: stereo.notices,
     menu: stereo.menu,
   };
 }

@@ -72,7 +72,7 @@ export class Studio implements StillMaker {
     const traced = forms.traced?.isShown ? forms.traced : null;
     const gl = renderer.getContext();
     scene.followScreen();
-    forms.dress();
+    forms.updateMaterials();
     const start_ms = performance.now();
     const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
     for (let frames = begun?.frames ?? 0; ; ) {

@@ -26,7 +26,7 @@ type Memory = {
   isBusy: boolean;
   fault: string;
   /** The last state that was reported to screen readers. */
-  said: string;
+  announced: string;
   bytes: number;
   /** Time at which bytes last arrived, ms; 0: none have since this page opened. */
   moved_ms: number;
@@ -250,7 +250,14 @@ export class InboxPage {
         act: (item, action, keeps) => void this.act(item, action, keeps),
         choose: (item, choices) => void this.choose(item, choices),
       });
-      const start = { understood: null, reading: 0, asked: -1, isBusy: false, fault: "", said: "" };
+      const start = {
+        understood: null,
+        reading: 0,
+        asked: -1,
+        isBusy: false,
+        fault: "",
+        announced: "",
+      };
       memory = { card, ...start, bytes, moved_ms: 0 };
       this.memories.set(id, memory);
     }
@@ -299,7 +306,7 @@ export class InboxPage {
     memory.card.update({ item, situation, understood, limits, ownName, isBusy, fault, reading });
     const words = wordsOf(item, upload, situation.isMoving, limits);
     const state = stateName(item, upload, situation.isMoving);
-    this.sayAloud(item, memory, state, `${titleOf(item, ownName)}: ${words}`);
+    this.announce(item, memory, state, `${titleOf(item, ownName)}: ${words}`);
     return memory.card.root;
   }
 
@@ -320,10 +327,10 @@ export class InboxPage {
   }
 
   /** Reports a new state to screen readers, but not each step of its progress. */
-  private sayAloud(item: Item, memory: Memory, state: string, words: string): void {
-    if (state === memory.said) return;
-    const isFirst = memory.said === "";
-    memory.said = state;
+  private announce(item: Item, memory: Memory, state: string, words: string): void {
+    if (state === memory.announced) return;
+    const isFirst = memory.announced === "";
+    memory.announced = state;
     if (!isFirst || item.doing === "uploading") setText(this.aloud, words);
   }
 }

@@ -134,7 +134,7 @@ export class ViewSharing {
 
   /** Schedules a message, because the view may have changed. */
   private note(): void {
-    if (this.timer === 0) this.timer = window.setTimeout(() => this.tell(), BETWEEN_MS);
+    if (this.timer === 0) this.timer = window.setTimeout(() => this.sendShared(), BETWEEN_MS);
   }
 
   private get ranges(): ReadonlyMap<string, readonly [number, number]> {
@@ -164,7 +164,7 @@ export class ViewSharing {
     };
   }
 
-  private tell(): void {
+  private sendShared(): void {
     this.timer = 0;
     const now = this.shared;
     const news = Object.entries(now).filter(
@@ -224,11 +224,11 @@ export class ViewSharing {
 
   private async look(ray: Ray): Promise<void> {
     const hit = this.host.objectAlong(ray);
-    const met = await this.host.reading.probe(ray);
-    if (met === null) return;
-    const [x, y, z] = met.point.map(rounded);
-    const { tile } = met;
-    const channel = hit?.channel ?? met.channel;
+    const probed = await this.host.reading.probe(ray);
+    if (probed === null) return;
+    const [x, y, z] = probed.point.map(rounded);
+    const { tile } = probed;
+    const channel = hit?.channel ?? probed.channel;
     this.picked = { point_um: [x, y, z], tile, channel, object: hit?.object?.label ?? null };
     this.note();
   }

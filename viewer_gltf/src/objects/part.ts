@@ -138,7 +138,7 @@ class ObjectsPart implements Part, ObjectMaps {
         this.host.revealed.emit(`${channel}/objects-card`);
       }
     }
-    return "met";
+    return "shared";
   }
 
   /** Saves a CSV file for each shown label map. */

@@ -19,16 +19,16 @@ export type Coverage = Readonly<{
 /**
  * Counts the tiles that are kept in all layers.
  *
- * @param come the requests that were answered
+ * @param answered the requests that were answered
  * @param kept keys of the requests that need no network
  */
 export function coverageOf(
   tiles: readonly string[],
   layers: readonly Layer[],
-  come: readonly Asked[],
+  answered: readonly Asked[],
   kept: ReadonlySet<string>,
 ): Coverage {
-  const shown = new Set(come.map(keyOf));
+  const shown = new Set(answered.map(keyOf));
   const hasAll = (asked: readonly Asked[], keys: ReadonlySet<string>) =>
     asked.every((each) => keys.has(keyOf(each)));
   const missing = new Set<string>();

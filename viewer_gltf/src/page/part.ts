@@ -71,7 +71,7 @@ class PagePart implements Part, PagePanel {
     this.timer = 0;
     const { panel } = this.host;
     this.html.update(panel.buildPagePanel());
-    if (this.keyboard.update()) this.overlays.said.withdraw();
+    if (this.keyboard.update()) this.overlays.announcement.withdraw();
     panel.noteShown();
   }
 
@@ -100,11 +100,11 @@ class PagePart implements Part, PagePanel {
   }
 
   say(words: string): void {
-    this.overlays.said.say(words);
+    this.overlays.announcement.say(words);
   }
 
   offer(words: string, label: string, act: () => void): void {
-    this.overlays.said.offer(words, label, act);
+    this.overlays.announcement.offer(words, label, act);
   }
 
   /** Announces why a request has no effect now, with a button if the refusal has one. */

@@ -276,13 +276,13 @@ describe("the keys", () => {
     }
     expect(silent).toEqual([]);
     expect(KEYS.requestOf("}", contexts.bare)).toEqual({ refusal: NO_SLICES });
-    const said = (name: string) => {
+    const announced = (name: string) => {
       const request = KEYS.requestOf(name, contexts.atEnd);
       if (request === null || isRefusal(request)) throw new Error(name);
       return spokenFeedback(request, atEnd, atEnd, new Map());
     };
-    expect(said("}")).toBe("Slices: x 100.0 %: at its limit");
-    expect(said("D")).toBe("Focus disc 40°: at its limit");
+    expect(announced("}")).toBe("Slices: x 100.0 %: at its limit");
+    expect(announced("D")).toBe("Focus disc 40°: at its limit");
   });
 
   it("go to the next tile, also while one is isolated", () => {

@@ -22,9 +22,9 @@ function find<K extends Control["kind"]>(state: ViewerState, kind: K, id: string
   if (found?.kind !== kind) throw new Error(`no ${kind} ${id}`);
   return found as Extract<Control, { kind: K }>;
 }
-function granted(state: ViewerState, wish: Request): ViewerState {
-  if (typeof wish === "string" || "panel" in wish) throw new Error("no action");
-  return reduce(state, wish);
+function granted(state: ViewerState, request: Request): ViewerState {
+  if (typeof request === "string" || "panel" in request) throw new Error("no action");
+  return reduce(state, request);
 }
 
 describe("the panel's section for path tracing", () => {

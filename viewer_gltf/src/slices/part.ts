@@ -104,8 +104,8 @@ class SlicesPart implements Part {
     return images === null || images.frames === null ? [] : images.valuesAt(images.point);
   }
 
-  advance({ sight }: FrameView): void {
-    this.slices?.update(sight);
+  advance({ eyeView }: FrameView): void {
+    this.slices?.update(eyeView);
   }
 
   retryFailed(): void {

@@ -69,7 +69,7 @@ class SurfacesPart implements Part, Form {
     this.set.update(camera, width_px, height_px);
   }
 
-  dress(): void {
+  updateMaterials(): void {
     this.set.applyAllStyles();
   }
 

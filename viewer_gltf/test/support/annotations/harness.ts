@@ -22,8 +22,8 @@ import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { labelBoxes } from "../../../src/capture/label_boxes";
 import { gazeOf, type Hit } from "../../../src/interaction/ray_pointer";
 import { rayAhead, rayUnder } from "../../../src/interaction/rays";
+import { eyeViewOf } from "../../../src/marks/eye_view";
 import type { Label } from "../../../src/marks/label";
-import { sightOf } from "../../../src/marks/sight";
 import type { Vec3 } from "../../../src/math/vec3";
 import { Reading } from "../../../src/probe/probe_reader";
 import { Specimen } from "../../../src/render/specimen_pose";
@@ -227,7 +227,7 @@ class Bench {
       head: camera.matrixWorld,
       specimen: specimen.group.matrixWorld,
       screen: shown,
-      sight: sightOf(camera.matrixWorld, specimen.group.matrixWorld, shown),
+      eyeView: eyeViewOf(camera.matrixWorld, specimen.group.matrixWorld, shown),
       gaze: rayAhead(camera.matrixWorld, specimen.group),
       disc: null,
       isPanelOpen: view.isPanelOpen ?? false,

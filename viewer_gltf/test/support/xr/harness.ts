@@ -224,7 +224,7 @@ class Stand {
     return point.toArray();
   }
 
-  tell(text: string): Promise<void> {
+  announce(text: string): Promise<void> {
     this.hands.announce(text);
     return this.step([0]);
   }
@@ -277,7 +277,7 @@ class Stand {
       regions: panel.regions.map(({ id }) => id),
       labels: panel.regions.map(({ label }) => label),
       drags: this.drags.length,
-      told: this.hands.notice.mesh.visible ? this.hands.notice.texts : [],
+      notices: this.hands.notice.mesh.visible ? this.hands.notice.texts : [],
       textures: this.renderer.info.memory.textures,
       geometries: this.renderer.info.memory.geometries,
     };
