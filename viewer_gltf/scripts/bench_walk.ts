@@ -3,9 +3,14 @@
  *
  *   npm run build && npm run bench-walk -- BUNDLE [--size 412x780]     CSS pixels
  *
- * The page is controlled by its keys in headless Chromium. Nothing is drawn, which does not change the counts. Prints
- * the triangles on screen, the bytes of volumes on the GPU, and the number of tiles with volumes: at rest on each tile,
- * and the largest numbers during the walk. The exit code is 1 if the gaze has missed a tile.
+ * The script presses the page's keys in headless Chromium. Nothing is drawn, which does not change the counts. It prints
+ * these numbers at rest on each tile, and the largest triangle and byte counts of the walk:
+ *
+ * - the triangles on screen
+ * - the bytes of volumes on the GPU
+ * - the tiles with volumes
+ *
+ * The exit code is 1 if the gaze has missed a tile.
  */
 import { readFile } from "node:fs/promises";
 import { join, resolve } from "node:path";
@@ -83,7 +88,8 @@ class Walk {
 
   /** Presses a key; returns false if that has moved nothing. */
   private async step(key: string): Promise<boolean> {
-    if (++this.steps > MAX_STEPS) throw new Error("the walk meets no end");
+    if (++this.steps > MAX_STEPS)
+      throw new Error(`the walk did not end within ${MAX_STEPS} key presses`);
     const before = (await this.viewer.snapshot()).look;
     await this.viewer.page.keyboard.press(key);
     await this.viewer.still();

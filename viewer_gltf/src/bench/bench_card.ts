@@ -26,7 +26,7 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
     {
       textContent:
         "The specimen flies once around and towards you, in every mode and at every size of its volumes. " +
-        "Keep this page in front until the table is there.",
+        "Keep this page visible until the table appears.",
     },
     {},
   );
@@ -67,7 +67,7 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
     }
   };
   const refused = (error: unknown) => {
-    card.append(element("p", { textContent: `No stereo: ${String(error)}` }));
+    card.append(element("p", { textContent: `Stereo could not start: ${String(error)}` }));
     return null;
   };
   return card;
@@ -81,7 +81,7 @@ function words({ index, count, mode, eyes, edge }: Step): string {
 }
 
 function resultOf(report: Report): readonly HTMLElement[] {
-  const canvas = element("canvas", { ariaLabel: "Frames a second by volume size" });
+  const canvas = element("canvas", { ariaLabel: "Frames per second by volume size" });
   canvas.role = "img";
   drawChart(canvas, report);
   const head = ["mode", "eyes", "voxels", "frames/s", "median ms", "95 % ms", "draw calls"];

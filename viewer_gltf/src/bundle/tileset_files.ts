@@ -17,7 +17,7 @@ export function checkGlb(bytes: Uint8Array, path: string): void {
   const length = view.getUint32(8, true);
   if (length !== bytes.length) {
     throw new BundleError(
-      `${path}: found ${bytes.length} bytes, expected ${length} (a broken upload?)`,
+      `${path}: found ${bytes.length} bytes, expected ${length}: upload the file again`,
     );
   }
 }
@@ -50,7 +50,9 @@ export function checkTileset(value: unknown, path: string): Tileset {
   const { root } = tileset ?? {};
   const isTile = typeof root === "object" && root !== null && Array.isArray(root.children ?? []);
   if (typeof tileset?.asset?.version !== "string" || !isTile) {
-    throw new BundleError(`${path}: expected a 3D Tiles tileset with asset.version and root`);
+    throw new BundleError(
+      `${path}: found JSON without asset.version or root, expected a 3D Tiles tileset`,
+    );
   }
   return tileset as Tileset;
 }

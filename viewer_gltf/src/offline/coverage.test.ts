@@ -44,7 +44,7 @@ it("ignores a layer that was never shown", () => {
 
 it("announces that every place is kept, or how much is kept and why not more", () => {
   expect(coverageText({ tiles: 10 }, 10)).toMatch(/^Ready offline: /);
-  const more = "Each tile that you look at from near is kept, too.";
+  const more = "A tile is also kept once you have looked at it from near.";
   expect(coverageText({ tiles: 3 }, 10)).toBe(
     `Kept for offline: the overview and 3 of 10 tiles. ${more}`,
   );

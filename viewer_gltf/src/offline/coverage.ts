@@ -46,13 +46,13 @@ export function coverageOf(
   return { tiles: tiles.filter((tile) => !missing.has(tile)).length };
 }
 
-const MORE = "Each tile that you look at from near is kept, too.";
+const MORE = "A tile is also kept once you have looked at it from near.";
 const BY_VIEW = "This host sends volumes for each view, so volumes need the network.";
 
 /** Returns the sentences that the page announces: how much is kept, and why not more. */
 export function coverageText({ tiles, isByView = false }: Coverage, of: number): string {
   if (tiles === of)
-    return "Ready offline: every place opens without a network, as you have seen it.";
+    return "Ready offline: the whole specimen opens without a network, as detailed as you have seen it.";
   const places = tiles === 0 ? "" : ` and ${tiles} of ${of} tiles`;
   return `Kept for offline: the overview${places}. ${isByView ? BY_VIEW : MORE}`;
 }

@@ -72,7 +72,7 @@ export function makeCoarse(
   const sample = sampleOf(stored);
   const least = leastOf(sample);
   if (least === null) {
-    throw new SourceError(`${where}: all voxels are NaN or infinite, expected an image.`);
+    throw new SourceError(`${where}: all voxels are NaN or infinite, expected finite numbers.`);
   }
   // Values that are not finite become the smallest one, as in the readers of the pipeline.
   for (const values of [voxels, sample]) {

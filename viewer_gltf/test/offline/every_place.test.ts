@@ -75,7 +75,7 @@ describeInChromium("the words about a visit without a network", () => {
 
   it("promise every tile after each was shown, and each shows without a network", async () => {
     const all = await tiles();
-    const first = `Kept for offline: the overview and 1 of ${all.length} tiles. Each tile that you look at from near is kept, too.`;
+    const first = `Kept for offline: the overview and 1 of ${all.length} tiles. A tile is also kept once you have looked at it from near.`;
     await expect.poll(announced).toEqual([first]);
     expect(await offline()).toBe("partly");
     const seen = new Map<string, Picture>();
