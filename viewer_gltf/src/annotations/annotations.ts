@@ -94,7 +94,7 @@ export class Marks {
     this.group.name = "marks";
     this.group.add(handles.group, lamps.group, measured.group);
     this.group.add(ruler.group, axes.group, name.group);
-    this.follow(state);
+    this.sync(state);
   }
 
   /** Elements that the page places over the canvas. */
@@ -107,7 +107,7 @@ export class Marks {
     return [this.group];
   }
 
-  follow(state: ViewerState): void {
+  sync(state: ViewerState): void {
     this.state = state;
     this.handles.show(markedClip(state.clip, this.opening, this.isPointedAt), this.shown);
     this.lamps.show(state, this.specimen);
@@ -129,7 +129,7 @@ export class Marks {
     this.surfaces = surfaces;
     this.name.follow(view.gaze, TREMBLE_M / m_per_um, view.dt_s, () => this.nameOf(view.gaze));
     if (this.state.measured.length > 0) this.showMeasured(); // volumes load and refine, which changes the values
-    if (view.screen === null) this.updateInRoom(view);
+    if (view.screen === null) this.updateInStereo(view);
     else this.updateOnScreen(view, view.screen, m_per_um);
     this.handles.update(this.eyeView);
     this.lamps.update(this.eyeView);
@@ -192,7 +192,7 @@ export class Marks {
     if (this.isPointedAt) return;
     this.isPointedAt = true;
     if (this.state.clip !== this.opening) return;
-    this.follow(this.state);
+    this.sync(this.state);
     this.options.onChange();
   }
 
@@ -205,7 +205,7 @@ export class Marks {
     return this.options.manifest.specimen.bounds_um;
   }
 
-  private updateInRoom({ isPanelOpen, isBarBelow }: FrameView): void {
+  private updateInStereo({ isPanelOpen, isBarBelow }: FrameView): void {
     const { eyeView, shown } = this;
     this.showHandles();
     this.highlight(this.target.takeSeen());
@@ -215,7 +215,7 @@ export class Marks {
     if (isPanelOpen) this.ruler.group.visible = false;
     this.axes.group.visible = !isPanelOpen;
     this.axes.update(shown, eyeView);
-    this.name.placeInRoom(eyeView);
+    this.name.placeInStereo(eyeView);
   }
 
   private updateOnScreen(

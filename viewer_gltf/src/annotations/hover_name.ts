@@ -74,7 +74,7 @@ export class NameMark {
     this.root.hidden = this.text === "";
   }
 
-  placeInRoom(eyeView: EyeView): void {
+  placeInStereo(eyeView: EyeView): void {
     this.root.hidden = true;
     this.label.write(this.text);
     this.label.place(this.at, eyeView);

@@ -198,16 +198,16 @@ export class FrameLoop {
     const fade_s = Math.min(this.hasDrawn ? LONGEST_FADE_S : LONGEST_FRAME_S, passed_s);
     this.hasDrawn = false;
     if (forms.hasJustBegun()) onOverview();
-    const inRoom = stereo.pose(picture.eyes);
+    const stereoCamera = stereo.pose(picture.eyes);
     picture.isSeeThrough = stereo.isInUsersRoom;
-    const camera = inRoom ?? this.scene.poseMono(passed_s);
-    if (inRoom !== null) {
+    const camera = stereoCamera ?? this.scene.poseMono(passed_s);
+    if (stereoCamera !== null) {
       stereo.update(dt_s, viewpoint.head, this.options.shown().state, fade_s);
     }
     const { isChanging, isFading } = this.scene.advance(dt_s, fade_s);
     if (isChanging) this.isStale = true;
     if (isFading) this.hasNews = true;
-    return { camera, isStereo: inRoom !== null, isChanging, isFading };
+    return { camera, isStereo: stereoCamera !== null, isChanging, isFading };
   }
 
   /** Begins a frame within its budget. */

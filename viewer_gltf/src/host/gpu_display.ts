@@ -34,7 +34,7 @@ export type DisplayOptions = Readonly<{
   report: (error: unknown) => void;
   stereo: Pick<StereoOptions, "buildPanel" | "onCommand" | "onLenses" | "onChoose">;
   /** Updates the display and the parts to the state again. */
-  follow: () => void;
+  sync: () => void;
   /** Called when stereo has begun or ended. */
   onStereo: () => void;
   /** Called after every frame. */
@@ -80,9 +80,9 @@ export class GpuDisplay implements Display {
 
   /** Starts to draw, after all parts have been made. */
   start(): void {
-    const { parts, follow } = this.options;
+    const { parts, sync } = this.options;
     for (const group of parts.groups) this.room.specimen.group.add(group);
-    follow();
+    sync();
     this.loop.start();
   }
 
@@ -158,7 +158,7 @@ export class GpuDisplay implements Display {
 
   setScreen(perInch: number | null): void {
     this.perInch = perInch;
-    this.options.follow();
+    this.options.sync();
   }
 
   get cssPixelsPerInch(): number | null {
@@ -171,7 +171,7 @@ export class GpuDisplay implements Display {
 
   limitEdge(edge: number): void {
     this.forms.limitEdge(edge);
-    this.options.follow();
+    this.options.sync();
   }
 
   get isLoading(): boolean {
@@ -197,11 +197,11 @@ export class GpuDisplay implements Display {
   renew(): void {
     this.forms.forget(); // textures that were made since the loss
     this.loop.renew();
-    this.options.follow();
+    this.options.sync();
   }
 
   private makeLoop(): FrameLoop {
-    const { bundle, renderer, stage, parts, state, follow, onFrame } = this.options;
+    const { bundle, renderer, stage, parts, state, sync, onFrame } = this.options;
     return new FrameLoop({
       ...{ renderer, stage, onFrame, room: this.room, hybrid: this.hybrid },
       bounds: bundle.manifest.specimen.bounds_um,
@@ -210,8 +210,8 @@ export class GpuDisplay implements Display {
         return { forms, parts, stereo, viewpoint, state: state() };
       },
       onAdvance: (frame) => this.advance(frame),
-      onFocus: follow,
-      onOverview: follow,
+      onFocus: sync,
+      onOverview: sync,
     });
   }
 

@@ -221,7 +221,7 @@ export interface PartHost {
   /** The user has chosen another lens profile in stereo. */
   readonly lensesChosen: Signal<Lenses>;
   /** Whether the user is in stereo, where the page is not visible. */
-  readonly isInRoom: boolean;
+  readonly isInStereo: boolean;
   /** @param isStep whether the action is a step that undo takes back */
   dispatch(action: Action, isStep?: boolean): void;
   /** Runs a command. Returns whether that was possible. */

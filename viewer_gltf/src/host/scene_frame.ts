@@ -52,7 +52,7 @@ export class SceneFrame {
     const outline = forms.outline(state);
     if (outline !== null) navigation.setOccupied(outline);
     const shown = forms.shownPoints(state);
-    if (shown !== null) this.options.room.fitBackdrop(navigation.inRoom(shown));
+    if (shown !== null) this.options.room.fitBackdrop(navigation.toScene(shown));
     navigation.update(dt_s);
     this.followScreen();
     return navigation.camera;

@@ -19,7 +19,7 @@ export class Taps {
     private readonly parts: Parts,
     private readonly signal: AbortSignal,
   ) {
-    const isFlat = () => !host.isInRoom;
+    const isFlat = () => !host.isInStereo;
     listenForClicks(
       host.canvas,
       (point) => {

@@ -121,7 +121,7 @@ export class ViewSharing {
     host.changed.subscribe(() => this.note());
     host.drawn.subscribe(() => this.note());
     port.addEventListener("message", ({ data }: MessageEvent) => {
-      if (data.type === "state") this.follow(data.state);
+      if (data.type === "state") this.sync(data.state);
     });
     port.postMessage({ type: "open" });
     void display.settled().then(() => port.postMessage({ type: "shown" }));
@@ -178,14 +178,14 @@ export class ViewSharing {
   }
 
   /** Shows the state that Python requests, and sends the resulting state. */
-  private follow(asked: Asked): void {
+  private sync(asked: Asked): void {
     const { host } = this;
     this.known = { ...this.known, ...(asked as Partial<Shared>) };
     host.viewpoint.stopTurning();
-    this.followLooks(asked);
+    this.applyState(asked);
     if (asked.link !== undefined && asked.link !== this.shared.link) {
       this.openLink(asked.link);
-      this.followLooks(asked);
+      this.applyState(asked);
     }
     if (asked.picked !== undefined && !isSame(asked.picked, this.picked)) {
       this.picked = asked.picked;
@@ -195,7 +195,7 @@ export class ViewSharing {
     this.note();
   }
 
-  private followLooks(asked: Asked): void {
+  private applyState(asked: Asked): void {
     const { host, ranges } = this;
     const { viewpoint } = host;
     for (const channel of host.state.channels) {
@@ -239,7 +239,7 @@ export class ViewSharing {
     await display.settled();
     const { link } = this.shared;
     // If the view has changed since the last message, the next message schedules another picture.
-    if (link === this.pictured || link !== this.known.link || this.host.isInRoom) return;
+    if (link === this.pictured || link !== this.known.link || this.host.isInStereo) return;
     if (isTraced(this.host.state) && display.snapshot().traced.samples < MIN_SAMPLES) {
       this.rest = window.setTimeout(() => void this.picture(), REST_MS);
       return;

@@ -112,7 +112,7 @@ class PagePart implements Part, PagePanel {
     const { host } = this;
     const words = withKeys(refusal, host.panel.view.keyChanges);
     host.announce(words);
-    if (host.isInRoom) return;
+    if (host.isInStereo) return;
     const button = (await host.service("messages")?.buttonFor(refusal)) ?? null;
     if (button !== null) this.offer(words, button.label, button.act);
   }

@@ -29,7 +29,7 @@ export class EnvironmentLight {
   ) {}
 
   /** Lights the scene by an environment, unless it is the current one. */
-  follow(name: string): void {
+  sync(name: string): void {
     if (name !== OWN && name !== this.name) void this.load(name);
   }
 

@@ -48,12 +48,12 @@ class PathTracePart implements Part, Form {
   }
 
   sync(state: ViewerState): void {
-    this.volume?.follow(state);
+    this.volume?.sync(state);
   }
 
   panel(view: PanelView): readonly PartSection[] {
-    const { state, isInRoom } = this.host;
-    return lightSections(state, view, isInRoom);
+    const { state, isInStereo } = this.host;
+    return lightSections(state, view, isInStereo);
   }
 
   get isLoading(): boolean {

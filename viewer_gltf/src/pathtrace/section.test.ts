@@ -96,8 +96,8 @@ describe("the panel's section for path tracing", () => {
 
   it("has the same controls in stereo, except for the file", () => {
     const ids = (isStereo: boolean) => controlsOf(TRACED, isStereo).map(({ id }) => id);
-    const [onScreen, inRoom] = [ids(false), ids(true)];
-    expect(onScreen.filter((id) => !inRoom.includes(id))).toEqual(["trace", "own-light"]);
-    expect(inRoom).toContain("trace/lamps");
+    const [onScreen, inStereo] = [ids(false), ids(true)];
+    expect(onScreen.filter((id) => !inStereo.includes(id))).toEqual(["trace", "own-light"]);
+    expect(inStereo).toContain("trace/lamps");
   });
 });

@@ -53,7 +53,7 @@ export class TracedVolume implements TracedVolumes {
       onTexels: (texels) => this.take(texels),
       onRefused: () => {
         this.drop();
-        if (this.state !== null) this.follow(this.state);
+        if (this.state !== null) this.sync(this.state);
       },
       onChange,
       onError: (error) => this.fail(error),
@@ -98,7 +98,7 @@ export class TracedVolume implements TracedVolumes {
     return this.medium.shown(tables, state.isolated);
   }
 
-  follow(state: ViewerState): void {
+  sync(state: ViewerState): void {
     this.state = state;
     if (!isTraced(state)) {
       this.drop();
@@ -116,7 +116,7 @@ export class TracedVolume implements TracedVolumes {
       this.wanted = wanted;
       if (channels.length > 0) void this.medium.load({ channels, tiles }, this.limits);
     }
-    this.environment.follow(state.trace.environment);
+    this.environment.sync(state.trace.environment);
     this.setAppearances();
   }
 
@@ -213,7 +213,7 @@ export class TracedVolume implements TracedVolumes {
           isEncoded: true,
         });
         this.group.add(this.overlay.mesh);
-        if (this.state !== null) this.follow(this.state);
+        if (this.state !== null) this.sync(this.state);
         this.onChange();
         return tracer;
       });

@@ -154,7 +154,7 @@ export class FrameRenderer {
     room.aimLamps(head);
     room.isFlat = this.eyes.all.length === 1;
     this.both.prepare(room.scene);
-    this.cuts.follow(clip, specimen);
+    this.cuts.sync(clip, specimen);
     this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
     this.marchFrame.uIsCrossing.value = marches?.isInDisc ?? false;

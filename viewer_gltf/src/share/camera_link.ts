@@ -24,7 +24,7 @@ export function readLook(eye: string, pose: string | null): CameraView | null {
   if (camera === null || (pose !== null && specimen === null)) return null;
   const [px, py, pz, tx, ty, tz] = camera;
   const isBlind = Math.hypot(px - tx, py - ty, pz - tz) < NEAREST_M;
-  if (isBlind || !areInRoom(camera)) return null;
+  if (isBlind || !areInScene(camera)) return null;
   return { position: [px, py, pz], target: [tx, ty, tz], specimen };
 }
 
@@ -33,7 +33,7 @@ function readSpecimen(pose: string): SpecimenPlacement | null {
   if (values === null) return null;
   const [x, y, z, qx, qy, qz, qw, size] = values;
   const length = Math.hypot(qx, qy, qz, qw);
-  if (!(length > 0.5) || !(size > 0) || !areInRoom([x, y, z])) return null;
+  if (!(length > 0.5) || !(size > 0) || !areInScene([x, y, z])) return null;
   return {
     position: [x, y, z],
     orientation: [qx / length, qy / length, qz / length, qw / length],
@@ -41,6 +41,6 @@ function readSpecimen(pose: string): SpecimenPlacement | null {
   };
 }
 
-function areInRoom(values: readonly number[]): boolean {
+function areInScene(values: readonly number[]): boolean {
   return values.every((value) => Math.abs(value) <= FARTHEST_M);
 }

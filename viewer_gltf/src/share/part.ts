@@ -77,7 +77,7 @@ class SharePart implements Part, Links {
       without === 0
         ? ""
         : ` The link leaves out ${without} objects, because their lists are too long. Save them as CSV.`;
-    if (host.isInRoom) {
+    if (host.isInStereo) {
       host.announce(`The link is in the page's address. Copy it after you leave stereo.${but}`);
     } else if (await copyText(address.href)) {
       host.announce(`The link is in the clipboard.${but}`);

@@ -93,29 +93,29 @@ class StereoPart implements Part, StereoFinder {
   }
 
   panel(view: PanelView): readonly PartSection[] {
-    const { state, isInRoom, panel, stereo } = this.host;
+    const { state, isInStereo, panel, stereo } = this.host;
     const { facts } = panel;
     const facing = {
       stereo: facts.stereo,
       split: stereo.kind === "headset" ? null : SPLIT,
       canScan: facts.canScan,
-      hasRoom: facts.hasRoom && !isInRoom,
+      hasRoom: facts.hasRoom && !isInStereo,
       faultOfCode,
     };
-    return stereoSections(state, { ...facing, isStereo: isInRoom }, view);
+    return stereoSections(state, { ...facing, isStereo: isInStereo }, view);
   }
 
   private toggleHeadset(): void {
-    const { stereo, panel, isInRoom } = this.host;
+    const { stereo, panel, isInStereo } = this.host;
     const { isAvailable, reason } = panel.facts.stereo;
-    if (isInRoom) stereo.end();
+    if (isInStereo) stereo.end();
     else if (isAvailable) void this.enter("immersive-vr");
     else this.host.announce(reason);
   }
 
   private toggleRoom(): void {
-    const { stereo, panel, isInRoom } = this.host;
-    if (isInRoom) stereo.end();
+    const { stereo, panel, isInStereo } = this.host;
+    if (isInStereo) stereo.end();
     else if (panel.facts.hasRoom) void this.enter("immersive-ar");
     else this.host.announce(NO_ROOM);
   }

@@ -138,7 +138,7 @@ export class SurfaceSet implements Surfaces {
     }
   }
 
-  follow(state: ViewerState, focusTiles: FocusTiles): void {
+  sync(state: ViewerState, focusTiles: FocusTiles): void {
     this.state = state;
     this.focusTiles = focusTiles;
     this.openTile(marchedTile(state, focusTiles));

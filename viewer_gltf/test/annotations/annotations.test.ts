@@ -263,8 +263,8 @@ describeInChromium("marks", () => {
     const px_per_rad = HEIGHT / 2 / Math.tan((20 * Math.PI) / 180);
     for (const angle of angles) expect(angle * px_per_rad).toBeCloseTo(LABEL_PX, 1);
     await look([0, 0, 2], [0, 0, 0], { isStereo: true });
-    const inRoom = (await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0;
-    expect(inRoom).toBeCloseTo(STEREO_TEXT * LABEL_HEIGHT, 5);
+    const inStereo = (await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0;
+    expect(inStereo).toBeCloseTo(STEREO_TEXT * LABEL_HEIGHT, 5);
   });
 
   it("have a handle that moves a face with the pointer, while the camera stays", async () => {

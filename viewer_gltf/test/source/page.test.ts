@@ -296,7 +296,9 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         const field = stand.viewer.page.locator('[data-choose="file"]');
         await field.setInputFiles(join(folder, "notes.txt"));
         const status = stand.viewer.page.locator("[data-source-status]");
-        await expect.poll(() => status.textContent()).toContain("notes.txt: found another format, expected NIfTI");
+        await expect
+          .poll(() => status.textContent())
+          .toContain("notes.txt: found another format, expected NIfTI");
         await field.setInputFiles(join(folder, "sharded.ozx"));
         expect((await shown()).state.channels.length).toBe(2);
       });

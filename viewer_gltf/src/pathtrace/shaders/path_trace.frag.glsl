@@ -163,7 +163,7 @@ float openness(vec3 p, vec3 to, vec2 span) {
 
 // Returns the light of a path that begins with a scattering at `p`, and writes the openness around that point. If `p`
 // lies on a cut face, `face` is its normal, and otherwise 0.
-vec3 follow(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
+vec3 tracePath(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
   vec3 sum = vec3(0.0);
   vec3 weight = vec3(1.0);
   open = 1.0;
@@ -227,7 +227,7 @@ void main() {
   vec3 face = span.x > 0.0 && t < FACE_DEPTH * uVoxel ? cutFace(start) : vec3(0.0);
   vec3 p = face == vec3(0.0) ? start + t * dir : start;
   float open;
-  vec3 color = min(follow(p, dir, medium, face, open), vec3(uMostLight));
+  vec3 color = min(tracePath(p, dir, medium, face, open), vec3(uMostLight));
   float luminance = dot(color, vec3(0.2126, 0.7152, 0.0722));
   oSums += vec4(color, 1.0);
   oMoments += vec4(luminance * luminance, 0.0, span.x + t, open);

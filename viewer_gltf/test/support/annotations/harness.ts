@@ -143,7 +143,7 @@ class Bench {
     const dispatch = (action: Action) => {
       this.state = reduce(this.state, action);
       this.reading.state = this.state;
-      this.marks.follow(this.state);
+      this.marks.sync(this.state);
       this.draw();
     };
     const manifest = { ...MANIFEST, specimen: { ...MANIFEST.specimen, sides } };
@@ -200,7 +200,7 @@ class Bench {
   dispatch(action: Action): void {
     this.state = reduce(this.state, action);
     this.reading.state = this.state;
-    this.marks.follow(this.state);
+    this.marks.sync(this.state);
     this.draw();
   }
 

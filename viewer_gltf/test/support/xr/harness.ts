@@ -324,7 +324,7 @@ function leftOfTheUncut(): readonly (readonly [number, number])[] {
   const side_px = 16;
   renderer.setSize(side_px, side_px, false);
   const cuts = new Cuts();
-  cuts.follow({ box: null, plane: { normal: [0, 0, 1], offset_um: -1e6 } }, new Matrix4());
+  cuts.sync({ box: null, plane: { normal: [0, 0, 1], offset_um: -1e6 } }, new Matrix4());
   const both = new BothEyes();
   const { uCuts, uCutCount } = cuts;
   const material = depthMaterial({ uCuts, uCutCount, ...both.uniforms }, both);
