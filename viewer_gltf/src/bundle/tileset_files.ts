@@ -130,15 +130,15 @@ export class TilesetFiles {
   /** Returns a tileset, or the bytes of a surface. Throws BundleError, or AbortError. */
   async fetch(address: string, signal?: AbortSignal | null): Promise<Tileset | ArrayBuffer> {
     const { base, file } = this;
-    if (address === this.root) return this.learn(await fetchTileset(base, file), address);
+    if (address === this.root) return this.readHashes(await fetchTileset(base, file), address);
     const hash = this.hashes.get(address);
     if (hash === undefined) throw new Error(`${address} is not in its tileset`);
     const path = this.nameOf(address);
     if (!path.endsWith(".json")) return fetchGlb(base, path, hash, signal);
-    return this.learn(await fetchExternal(base, path, hash, signal), address);
+    return this.readHashes(await fetchExternal(base, path, hash, signal), address);
   }
 
-  private learn(tileset: Tileset, address: string): Tileset {
+  private readHashes(tileset: Tileset, address: string): Tileset {
     const found = contentHashes(tileset, this.nameOf(address), address);
     for (const [each, hash] of found) this.hashes.set(each, hash);
     // The renderer warns about version 1.1. A bundle uses only one new feature of it, glTF content, which works.

@@ -66,7 +66,7 @@ export type PartScene = Readonly<{
   group: Object3D;
   /** Objects that are not in the depth pass. */
   overlays: readonly Object3D[];
-  /** A number that changes with what the part hides; 0: nothing. */
+  /** A number that changes when the part's opaque objects change; 0: it has none. */
   solid: number;
   /** Whether the objects are visible even if no channel is shown. */
   isStanding: boolean;
@@ -118,7 +118,7 @@ export interface Part {
   /** Returns the nearest hit of a ray (um); null: none. */
   pick?(ray: Ray): Hit | null;
   /** Called for every choice in the view, before it has an effect. */
-  hearTap?(tap: Tap): void;
+  onTap?(tap: Tap): void;
   tap?(tap: Tap): TapAnswer;
   /** Called for a choice on the flat screen that no part has used. */
   openCard?(tap: Tap): void;

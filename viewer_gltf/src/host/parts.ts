@@ -103,8 +103,8 @@ export class Parts {
     return hits.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
   }
 
-  hearTap(tap: Tap): void {
-    for (const part of this.all) part.hearTap?.(tap);
+  onTap(tap: Tap): void {
+    for (const part of this.all) part.onTap?.(tap);
   }
 
   /** Passes a tap to the parts until one has used it. */

@@ -22,8 +22,9 @@ import { ahead } from "../xr/head_pose";
 import type { Stereo } from "../xr/stereo";
 import { StereoTransition } from "./stereo_transition";
 
-/** Distance of the eye from an object that it flies to, in lengths of the object, and at least in m. */
+/** Distance of the eye from an object that it flies to, as a multiple of the object's length. */
 const NEAREST_OBJECT = 6;
+/** Smallest distance of the eye from an object that it flies to, m. */
 const NEAREST_OBJECT_M = 0.08;
 /** Directions from which to view an object: corners, edges and faces of a cube, from the front first. */
 const VIEW_DIRECTIONS = [1, 0, -1].flatMap((z) =>

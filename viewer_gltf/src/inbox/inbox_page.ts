@@ -78,7 +78,7 @@ export class InboxPage {
       this.aloud,
     );
     this.empty.textContent = "Asking the server for its images.";
-    void this.learnHandles();
+    void this.loadHandles();
     addEventListener("offline", () => this.eachUpload((upload) => upload.loseConnection()));
     addEventListener("online", () => this.eachUpload((upload) => upload.retryNow()));
     addEventListener("beforeunload", (event) => {
@@ -94,7 +94,7 @@ export class InboxPage {
     this.render();
   }
 
-  private async learnHandles(): Promise<void> {
+  private async loadHandles(): Promise<void> {
     this.withHandles = new Set(await keptItems());
     this.render();
   }
@@ -147,7 +147,7 @@ export class InboxPage {
 
   private async endUpload({ id, progress }: Upload): Promise<void> {
     if (progress.doing === "complete") await forgetHandles(id);
-    await this.learnHandles();
+    await this.loadHandles();
   }
 
   /** Sends an address to the server. Returns whether the server has accepted it. */
@@ -292,7 +292,7 @@ export class InboxPage {
     if (item.bytes > memory.bytes) memory.moved_ms = performance.now();
     memory.bytes = item.bytes;
     if (item.doing === "understanding") memory.reading = memory.asked + 1;
-    if (isRead(item) && memory.asked < memory.reading) void this.learn(item, memory);
+    if (isRead(item) && memory.asked < memory.reading) void this.loadSummary(item, memory);
     const isMoving = memory.moved_ms > 0 && performance.now() - memory.moved_ms < MOVING_MS;
     const { understood, isBusy, fault, reading } = memory;
     const ownName = this.names.get(item.id) ?? "";
@@ -316,7 +316,7 @@ export class InboxPage {
   }
 
   /** Fetches the summary of an item. */
-  private async learn(item: Item, memory: Memory): Promise<void> {
+  private async loadSummary(item: Item, memory: Memory): Promise<void> {
     memory.asked = memory.reading;
     try {
       memory.understood = await this.server.understood(item.id);

@@ -1,6 +1,6 @@
 /** Moves labels that would overlap. The later one of two moves up or down. Pure. */
 
-/** A label's box in lines, y up. The lines of all labels look equally high. */
+/** A label's box. The unit is the height of a text line, which looks equal for all labels; y is up. */
 export type LabelBox = Readonly<{
   /** The lower left corner. */
   x: number;

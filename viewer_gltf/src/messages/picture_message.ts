@@ -65,7 +65,7 @@ export class PictureMessage {
         this.requestList(channel);
         return this.known.has(channel) ? volumes?.source(tile, channel) != null : null;
       },
-      objectsLeft: (channel) => host.service("objects")?.left(channel) ?? null,
+      shownObjectCount: (channel) => host.service("objects")?.shownCount(channel) ?? null,
     };
   }
 

@@ -128,7 +128,7 @@ export class ViewSharing {
     this.note();
   }
 
-  hearTap({ ray }: Tap): void {
+  onTap({ ray }: Tap): void {
     void this.look(ray);
   }
 

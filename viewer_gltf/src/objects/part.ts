@@ -177,8 +177,8 @@ class ObjectsPart implements Part, ObjectMaps {
     return new Map(this.shown.map(({ channel: { id }, objects }) => [id, objects.shown]));
   }
 
-  left(channel: string): number | null {
-    return this.objects.get(channel)?.left ?? null;
+  shownCount(channel: string): number | null {
+    return this.objects.get(channel)?.shownCount ?? null;
   }
 
   retryFailed(): void {

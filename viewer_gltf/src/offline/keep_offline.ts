@@ -24,7 +24,7 @@ export class KeepOffline {
   /** The number of answers and the layers shown at the last check; a check without a change is skipped. */
   private looked = "";
   /** Whether this visit, or one before, has announced how much is kept. */
-  private hasSaid: boolean;
+  private hasAnnounced: boolean;
   private isReady: boolean;
   /** Requests that the worker had missed and was asked to keep. */
   private readonly missed = new Set<string>();
@@ -34,7 +34,7 @@ export class KeepOffline {
     private readonly keeping: Keeping,
   ) {
     this.layers = new OfflineLayers(host);
-    this.hasSaid = keeping.wasServed;
+    this.hasAnnounced = keeping.wasServed;
     this.isReady = keeping.wasServed;
   }
 
@@ -99,9 +99,9 @@ export class KeepOffline {
     const isReady = coverage?.tiles === length;
     document.documentElement.dataset.offline = isReady ? "ready" : "partly";
     // Only the first state and "ready" are announced; an announcement for each further tile would disturb.
-    if (coverage !== null && (!this.hasSaid || (isReady && !this.isReady))) {
+    if (coverage !== null && (!this.hasAnnounced || (isReady && !this.isReady))) {
       this.host.service("page")?.say(coverageText(coverage, length));
-      this.hasSaid = true;
+      this.hasAnnounced = true;
     }
     this.isReady = isReady;
   }

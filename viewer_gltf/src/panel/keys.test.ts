@@ -265,11 +265,11 @@ describe("the keys", () => {
         const after = reduce(context.state, request);
         const text = spokenFeedback(request, context.state, after, new Map());
         const isSame = JSON.stringify(after) === JSON.stringify(context.state);
-        const isSaid =
+        const isAnnounced =
           "value" in request && typeof request.value !== "number"
             ? text !== ""
             : /: (at its limit|already so|the only one)$|^Slices: centred/.test(text);
-        if (isSame && !isSaid) {
+        if (isSame && !isAnnounced) {
           silent.push(`${where} ${name}: ${text}`);
         }
       }

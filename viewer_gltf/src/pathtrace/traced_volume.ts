@@ -126,7 +126,7 @@ export class TracedVolume implements TracedVolumes {
     await this.environment.lightBy(file);
   }
 
-  /** Limits the texture's edge, in texels, from the next `follow` on. */
+  /** Limits the texture's edge, in texels, from the next `sync` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
     this.drop();

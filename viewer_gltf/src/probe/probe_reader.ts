@@ -22,7 +22,7 @@ import {
   tileAt,
   unitRay,
 } from "./probe";
-import { levelAtHand, TexelCache } from "./texel_cache";
+import { availableLevel, TexelCache } from "./texel_cache";
 
 /** Largest number of texels of the level in which the reader looks for a ray's hit. */
 const PROBED_TEXELS = 2 * 1024 * 1024;
@@ -119,7 +119,7 @@ export class Reading {
       const tile = this.tileAt(point);
       return this.shownChannels.map(({ id }) => {
         const source = this.options.source(tile, id);
-        return `${id} ${source && levelAtHand(source)}`;
+        return `${id} ${source && availableLevel(source)}`;
       });
     });
     return known.join();
@@ -146,7 +146,7 @@ export class Reading {
     const found: ProbedVolume[] = [];
     for (const { source, ...shown } of this.options.volumes()) {
       if (!crossed.some(({ id }) => id === shown.tile)) continue;
-      const level = await this.orReport(this.cache.atHand(source, PROBED_TEXELS));
+      const level = await this.orReport(this.cache.available(source, PROBED_TEXELS));
       if (level !== null) found.push({ ...shown, volume: source.volume, level });
     }
     return found;

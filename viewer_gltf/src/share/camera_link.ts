@@ -10,7 +10,7 @@ const FARTHEST_M = 100;
 const NEAREST_M = 1e-4;
 
 /** Returns the parameter `eye`, and `pose` if the specimen was moved. */
-export function writeLook({ position, target, specimen }: CameraView): Record<string, string> {
+export function writeCamera({ position, target, specimen }: CameraView): Record<string, string> {
   const eye = written([...position, ...target]);
   if (specimen === null) return { eye };
   const pose = written([...specimen.position, ...specimen.orientation, specimen.scale]);
@@ -18,7 +18,7 @@ export function writeLook({ position, target, specimen }: CameraView): Record<st
 }
 
 /** Reads a camera; null if it can't be read, or would not show anything. */
-export function readLook(eye: string, pose: string | null): CameraView | null {
+export function readCamera(eye: string, pose: string | null): CameraView | null {
   const camera = readNumbers(eye, 6);
   const specimen = pose === null ? null : readSpecimen(pose);
   if (camera === null || (pose !== null && specimen === null)) return null;

@@ -52,7 +52,7 @@ import { allParameters } from "../state/parameters/table";
 import { VOLUMES } from "../state/parameters/volumes";
 import { OWN } from "../state/transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
-import { readLook, writeLook } from "./camera_link";
+import { readCamera, writeCamera } from "./camera_link";
 import { linkedMeasurements, readMeasurements } from "./measurements_link";
 import { readNumbers, written } from "./numbers";
 import { readWord, type SwitchWords, writeWords } from "./parameter_words";
@@ -113,10 +113,10 @@ function linkOf(
       .map(({ id }) => encodeURIComponent(id))
       .join(",");
   if (shownOf(state) !== shownOf(start)) parts.c = shownOf(state);
-  const cameras = state.channels.flatMap((channel, i) =>
+  const appearances = state.channels.flatMap((channel, i) =>
     writeChannel(channel, start.channels[i], has),
   );
-  if (cameras.length > 0) parts.l = cameras.join(",");
+  if (appearances.length > 0) parts.l = appearances.join(",");
   Object.assign(parts, Object.fromEntries(writeWords(VOLUMES, state, start, WORDS)));
   const objects = Object.entries(state.objects).flatMap(([id, view]) => {
     const text = objectsOf(id, view);
@@ -139,7 +139,7 @@ function linkOf(
   Object.assign(parts, Object.fromEntries(writeWords(otherParameters(), state, start, WORDS)));
   const light = writeLight(state, start);
   if (light !== "") parts.light = light;
-  Object.assign(parts, camera === null ? {} : writeLook(camera));
+  Object.assign(parts, camera === null ? {} : writeCamera(camera));
   return `#${Object.entries(parts)
     .map(([name, text]) => `${name}=${text}`)
     .join("&")}`;
@@ -230,7 +230,7 @@ class LinkReader {
 
   read(): Shared {
     this.readShown();
-    this.readLooks();
+    this.readAppearances();
     this.readObjects();
     this.readParameters(VOLUMES);
     this.tile("tile", "select");
@@ -242,7 +242,7 @@ class LinkReader {
     this.readViews();
     this.readLight();
     const eye = this.parts.get("eye");
-    const camera = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
+    const camera = eye === undefined ? null : readCamera(eye, this.parts.get("pose") ?? null);
     if (eye !== undefined && camera === null) this.unread.push("eye");
     this.report("this bundle has no", this.unknown);
     this.report("left out parts that can't be read:", this.unread);
@@ -289,16 +289,16 @@ class LinkReader {
     });
   }
 
-  private readLooks(): void {
+  private readAppearances(): void {
     const text = this.parts.get("l");
     if (text === undefined) return;
     for (const entry of text.split(",")) {
-      const [id, ...cameras] = entry.split(":");
+      const [id, ...words] = entry.split(":");
       const channel = this.channel(id);
       if (channel === null) continue;
-      for (const camera of cameras) {
-        const action = lookAction(channel, camera);
-        if (action === null) this.unread.push(`l ${shortened(`${channel.id}:${camera}`)}`);
+      for (const word of words) {
+        const action = appearanceAction(channel, word);
+        if (action === null) this.unread.push(`l ${shortened(`${channel.id}:${word}`)}`);
         else this.actions.push(action);
       }
     }
@@ -391,7 +391,7 @@ class LinkReader {
     if (text === undefined) return;
     const words = text.split(",");
     const views = Array.from({ length: Math.ceil(words.length / 6) }, (_, i) =>
-      readLook(words.slice(6 * i, 6 * i + 6).join(), null),
+      readCamera(words.slice(6 * i, 6 * i + 6).join(), null),
     ).flatMap((view) => (view === null ? [] : [{ position: view.position, target: view.target }]));
     if (6 * views.length !== words.length) this.unread.push("views");
     else this.actions.push({ type: "keep-views", views });
@@ -405,8 +405,8 @@ class LinkReader {
   }
 }
 
-function lookAction({ id, transferFunctions }: ChannelState, camera: string): Action | null {
-  const [letter, value] = [camera.slice(0, 1), camera.slice(1)];
+function appearanceAction({ id, transferFunctions }: ChannelState, word: string): Action | null {
+  const [letter, value] = [word.slice(0, 1), word.slice(1)];
   const row = CHANNEL.find(({ link }) => link === letter);
   if (row !== undefined) return readWord(row, value, CHANNEL_WORDS, id);
   switch (letter) {

@@ -141,8 +141,8 @@ export class SlicePlanes {
   }
 
   sync(areShown: boolean): void {
-    const { frames, box, point, hasCome } = this.images;
-    this.group.visible = areShown && hasCome && frames !== null;
+    const { frames, box, point, hasLoaded } = this.images;
+    this.group.visible = areShown && hasLoaded && frames !== null;
     if (!this.group.visible || frames === null) return;
     this.planes.place(frames, box);
     const place = JSON.stringify(frames);

@@ -71,11 +71,11 @@ class StereoPart implements Part, StereoFinder {
     host.panel.show(rememberedLens());
     host.display.setScreen(rememberedScreen());
     for (const action of rememberedEyes()) host.dispatch(action);
-    void canScan().then((isAble) => host.panel.learn({ canScan: isAble }));
+    void canScan().then((isAble) => host.panel.addFacts({ canScan: isAble }));
   }
 
   async afterOpening(): Promise<void> {
-    this.host.panel.learn(await this.found);
+    this.host.panel.addFacts(await this.found);
   }
 
   /** Loads the code of stereo while the page is idle, if stereo is available. */

@@ -214,12 +214,12 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     if (texture instanceof SharpenedTile) texture.sharpen();
   }
 
-  /** Limits the texture edge from the next `follow` on. */
+  /** Limits the texture edge from the next `sync` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
   }
 
-  /** Lets failed volumes be loaded again by the next `follow`. */
+  /** Lets failed volumes be loaded again by the next `sync`. */
   retryFailed(): void {
     this.channels.forgetFailed();
     for (const { texture } of this.residents.all) texture.retryFailed();

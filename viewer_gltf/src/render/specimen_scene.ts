@@ -21,7 +21,7 @@ import { FAR, type Theme } from "./theme";
 
 const OUTLINE = 0x5b6678;
 
-export class Room {
+export class SpecimenScene {
   readonly scene = new Scene();
   readonly specimen: Specimen;
   /** The light on everything that is not path-traced. */
