@@ -31,7 +31,7 @@ async function fetchGlb(
 ): Promise<ArrayBuffer> {
   const response = await request(fileAddress(base, path), path, { signal });
   const bytes = await readBody(response, path);
-  checkGlb(bytes, path); // first, since its message is clearer for a file that is cut short than that of the hash
+  checkGlb(bytes, path); // before the hash, because the message for an incomplete file is clearer
   await checkHash(path, bytes, hash, SHA_256_128);
   return bytes.buffer;
 }

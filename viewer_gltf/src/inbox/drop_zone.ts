@@ -24,8 +24,8 @@ export class DropZone {
       element("p", {
         className: "hint",
         textContent:
-          "A file, a folder or a zip: DICOM, NIfTI, TIFF, OME-Zarr, CZI and more. All that is dropped at once is one " +
-          "specimen.",
+          "A file, a folder or a zip: DICOM, NIfTI, TIFF, OME-Zarr, CZI and more. Everything that you drop at once is " +
+          "one specimen.",
       }),
       this.choices(),
       this.addressForm(),

@@ -20,8 +20,9 @@ const MOVING_MS = 4000;
 type Memory = {
   card: Card;
   understood: Understood | null;
-  /** Raised whenever the item is read again; `asked`: the reading that was last asked for. */
+  /** Number of times that the server has read the item. */
   reading: number;
+  /** The reading whose summary was last requested. */
   asked: number;
   isBusy: boolean;
   fault: string;

@@ -11,7 +11,7 @@ import { Server } from "./server";
 
 const LIGHT = matchMedia("(prefers-color-scheme: light)");
 
-/** The page's colours are those of the system. */
+/** Gives the page the colour theme of the system. */
 function applyTheme(): void {
   document.documentElement.dataset.theme = LIGHT.matches ? "light" : "dark";
 }

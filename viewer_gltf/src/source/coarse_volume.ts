@@ -110,7 +110,7 @@ function blockMeans({ data, ...stored }: StoredVoxels, block: Triple, shape: Tri
   return voxels;
 }
 
-/** Values that are spread evenly over all voxels, in the order in which they are stored. */
+/** Returns values of voxels that are spread evenly over the volume, in the order in which they are stored. */
 function sampleOf({ data, shape, slope, intercept }: StoredVoxels): Float32Array<ArrayBuffer> {
   const count = Math.min(data.length, volumeOf(shape));
   let every = Math.ceil(count / SAMPLED_VOXELS);

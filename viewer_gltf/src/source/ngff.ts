@@ -77,7 +77,7 @@ function tableOf(value: unknown): Table {
 const listOf = (value: unknown): readonly unknown[] => (Array.isArray(value) ? value : []);
 
 /**
- * The image of a group's attributes.
+ * Reads the image that a group's attributes describe.
  *
  * @param where the source, for messages
  * Throws SourceError.

@@ -7,9 +7,9 @@ import type { OpenedImage, Report } from "./opened_image";
 import { SourceError } from "./source_error";
 import { partsOf } from "./zip_store";
 
-/** Largest volume that is read: a page has little more memory than twice that. */
+/** Largest volume that is read, bytes. Reading needs twice that, and a page has little more memory. */
 const MAX_BYTES = 1 << 30;
-/** Header and extensions before the voxels, at most. */
+/** Largest size of the header and its extensions before the voxels, bytes. */
 const MAX_OFFSET = 1 << 28;
 
 const ARRAYS: Readonly<
