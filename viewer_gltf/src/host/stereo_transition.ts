@@ -6,7 +6,7 @@ import { Euler, Quaternion, Vector3 } from "three";
 import type { Navigation } from "../interaction/orbit_camera";
 import { type HandPose, type SpecimenPose, zoomAbout } from "../math/grab";
 import { ROOM_SIZE, XR_DISTANCE_M } from "../render/placement";
-import { intoRoom, ontoScreen } from "../render/screen_to_room";
+import { intoStereo, ontoScreen } from "../render/screen_to_stereo";
 import type { Specimen } from "../render/specimen_pose";
 import type { CameraView } from "../state/camera_view";
 
@@ -40,7 +40,7 @@ export class StereoTransition {
     const size = table === null ? 1 : ROOM_SIZE;
     const onScreen = this.poseOnScreen;
     const hold = table === null ? this.screenHold : levelled(this.screenHold);
-    const pose = intoRoom(specimen.pose, hold, ahead_m, facing);
+    const pose = intoStereo(specimen.pose, hold, ahead_m, facing);
     specimen.anchorAt(ahead_m, size, facing);
     const sized = zoomAbout(pose, ahead_m, onScreen === null ? size * larger : size);
     const isOther = !navigation.isStraight || onScreen !== null || larger !== 1 || table !== null;

@@ -31,7 +31,7 @@ const VIEW_DIRECTIONS = [1, 0, -1].flatMap((z) =>
   [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
 );
 /** Smallest length of an object that is brought in front of the eyes in stereo, m. */
-const OBJECT_IN_ROOM_M = 0.15;
+const OBJECT_IN_STEREO_M = 0.15;
 
 export type ViewpointOptions = Readonly<{
   canvas: HTMLCanvasElement;
@@ -208,7 +208,7 @@ export class Viewpoint {
     const edge_m = specimen.scale * Math.max(...box.max.map((v, i) => v - box.min[i]));
     this.options.onChange();
     if (this.options.stereo().kind === null) return this.flyOnScreen(middle, edge_m, isSeen);
-    const larger = Math.max(1, OBJECT_IN_ROOM_M / edge_m);
+    const larger = Math.max(1, OBJECT_IN_STEREO_M / edge_m);
     const pose = zoomAbout(specimen.pose, middle, larger);
     pose.position.add(specimen.anchor).sub(middle);
     specimen.jumpTo(pose, new Vector3().setFromMatrixPosition(this.head));

@@ -65,8 +65,8 @@ export class Objects {
   ) {
     const { min, max } = options.manifest.specimen.bounds_um;
     const edge_um = Math.max(...max.map((v, i) => v - min[i]));
-    const umToRoom = options.specimen.matrixWorld;
-    this.material = new ObjectMaterial(table.boxes, INSET * edge_um, umToRoom);
+    const umToScene = options.specimen.matrixWorld;
+    this.material = new ObjectMaterial(table.boxes, INSET * edge_um, umToScene);
     this.flags = new Uint8Array(table.count);
     this.adoptAll();
   }

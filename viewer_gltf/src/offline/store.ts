@@ -77,7 +77,7 @@ export class Store {
       await this.cache.put(key, new Response(body, { headers }));
     } catch {
       this.ledger.delete(key);
-      await this.makeRoom();
+      await this.freeSpace();
     }
   }
 
@@ -98,7 +98,7 @@ export class Store {
     return this.saving;
   }
 
-  private async makeRoom(): Promise<void> {
+  private async freeSpace(): Promise<void> {
     let held = 0;
     for (const { bytes } of this.ledger.values()) held += bytes;
     await this.drop(keysToDrop(this.ledger, KEPT_AT_REFUSAL * held));

@@ -12,7 +12,7 @@ import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import type { BrickService } from "../voxels/bricks/brick_service";
 import type { MarchLight } from "../voxels/march_frame";
 import type { VolumeLimits } from "../voxels/mip_levels";
-import { EnvironmentLight, PATHS_NOT_LOADED, type StageRoom } from "./environment_light";
+import { EnvironmentLight, PATHS_NOT_LOADED, type StageEnvironment } from "./environment_light";
 import type { EnvironmentTables } from "./environment_sampling";
 import { MediumChanges } from "./medium_changes";
 import type { MediumTexels } from "./medium_loader";
@@ -45,7 +45,7 @@ export class TracedVolume implements TracedVolumes {
     bricks: BrickService | null,
     private limits: VolumeLimits,
     private readonly sceneDepth: { value: Texture },
-    stageRoom: StageRoom | null,
+    stageEnvironment: StageEnvironment | null,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {
@@ -59,7 +59,7 @@ export class TracedVolume implements TracedVolumes {
       onError: (error) => this.fail(error),
     });
     const lightBy = (tables: EnvironmentTables) => this.tracer?.lightBy(tables);
-    this.environment = new EnvironmentLight(stageRoom, lightBy, onChange, onError);
+    this.environment = new EnvironmentLight(stageEnvironment, lightBy, onChange, onError);
   }
 
   get isLoading(): boolean {

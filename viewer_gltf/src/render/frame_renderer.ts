@@ -20,7 +20,7 @@ import { Eyes } from "../gpu/eyes";
 import { drawWhole } from "../gpu/float_targets";
 import { linearTarget } from "../gpu/linear_target";
 import type { Clip } from "../math/clip";
-import { lightByRoom, makeFrame, REST_STEPS } from "../voxels/march_frame";
+import { lightByScene, makeFrame, REST_STEPS } from "../voxels/march_frame";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "./blend_material";
 import { CrossFade } from "./cross_fade";
 import { DepthPass } from "./depth_pass";
@@ -181,7 +181,7 @@ export class FrameRenderer {
       const lamp = this.lamp.set(...specimenScene.light.key.towards).transformDirection(axes);
       lamp.transformDirection(toSpecimen);
       const toEye = this.toEye.copy(head).invert().multiply(axes);
-      if (tracer === null) lightByRoom(this.marchFrame, specimenScene.light, toEye);
+      if (tracer === null) lightByScene(this.marchFrame, specimenScene.light, toEye);
       else tracer.lightMarch(this.marchFrame, specimen, head);
       const { apex_um: apex, axis_um: axis } = gazeFocus;
       volumes?.aim({ eye, apex, axis, clip: this.cuts.march, lamp });

@@ -27,7 +27,7 @@ uniform vec4 uCorner[3];
 uniform mat4 uToBox;  // from normalised device coordinates
 uniform vec3 uEyeAt;  // um, box
 uniform mat4 uSceneToBox;  // as uToBox, but of the current eye, which may have moved a little since
-uniform mat3 uToRoom;  // rotates directions from the box to the environment
+uniform mat3 uToEnvironment;  // rotates directions from the box to the environment
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels ...
 uniform vec4 uEye;  // ... and of the picture
 uniform sampler2D uSceneDepth;
@@ -127,7 +127,7 @@ vec3 lightAt(vec3 p, vec3 from, Scatter s) {
   float reach = 1e30;
   if (drawn == uLampCount) {
     vec4 found;
-    to = sampleEnvironment(found) * uToRoom;  // the transpose rotates back
+    to = sampleEnvironment(found) * uToEnvironment;  // the transpose rotates back
     if (found.a <= 0.0) return vec3(0.0);
     float density = scatterDensity(s, from, to);
     // the balance heuristic (Veach 1997), because scattered paths also reach the environment
@@ -186,7 +186,7 @@ vec3 tracePath(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
     float t = span.y > span.x ? track(p, to, span.x, span.y, medium) : -1.0;
     if (i == 1) open = openness(p, to, span);
     if (t < 0.0) {
-      vec4 found = environmentAt(uToRoom * to);
+      vec4 found = environmentAt(uToEnvironment * to);
       float density = scatterDensity(s, dir, to);
       float drawn = found.a / float(uLampCount + 1);
       return sum + weight * uEnvironmentLight * found.rgb * density / max(density + drawn, 1e-12);

@@ -240,10 +240,10 @@ class Bench {
   /** Returns the place of a point (um) on the page, in CSS pixels of the stage. */
   project(point: Vec3): Place {
     const room = new Vector3(...point).applyMatrix4(this.specimen.group.matrixWorld);
-    return this.projectRoom(room);
+    return this.projectScene(room);
   }
 
-  private projectRoom(room: Vector3): Place {
+  private projectScene(room: Vector3): Place {
     const { x, y } = room.clone().project(this.camera);
     const { clientWidth, clientHeight } = this.stage;
     return { x: ((x + 1) / 2) * clientWidth, y: ((1 - y) / 2) * clientHeight };
@@ -263,7 +263,7 @@ class Bench {
       .transformDirection(this.camera.matrixWorld)
       .multiplyScalar((length_um * this.specimen.scale) / 2);
     const [a, b] = [half, half.clone().negate()].map((by) =>
-      this.projectRoom(this.focus.clone().add(by)),
+      this.projectScene(this.focus.clone().add(by)),
     );
     return { text, shown_px, true_px: Math.hypot(a.x - b.x, a.y - b.y) };
   }
