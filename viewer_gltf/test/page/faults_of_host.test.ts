@@ -89,7 +89,7 @@ describeInChromium("a fault between host and page", () => {
     await stand.viewer.drawVolume("Block", true);
     await stand.viewer.chooseMode("all");
     expect((await notices()).join()).toContain(
-      `${path}: found 100 bytes, expected ${whole.length} : upload the file again`,
+      `${path}: found 100 bytes, expected ${whole.length}: upload the file again`,
     );
     // the volume of the other tile
     expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);

@@ -277,7 +277,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
 
         await writeFile(join(folder, "notes.txt"), "no image");
         await drop("notes.txt");
-        await expect.poll(async () => (await notices()).join()).toContain("notes.txt: expected");
+        await expect.poll(async () => (await notices()).join()).toContain("notes.txt: found");
         expect(await names()).toEqual(["NIfTI"]);
       });
 
