@@ -62,7 +62,7 @@ describeInChromium("the viewer in another page", () => {
     await send({ channels: { Balls: { opacity: 7 } } });
     await expect
       .poll(() => status.textContent())
-      .toBe("channels.Balls.opacity: found 7, expected 0 to 1");
+      .toBe("channels.Balls.opacity is 7, expected 0 to 1");
     // the frame itself has another origin than the page that may send requests
     const inner = page.frames().find((each) => each.url().includes("embed="));
     await inner?.evaluate(() =>
