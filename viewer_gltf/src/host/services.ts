@@ -75,7 +75,7 @@ export interface PagePanel {
   /** Focuses a control, also in a hidden panel. Returns whether it exists. */
   focus(section: string, control: string): boolean;
   /** Shows an announcement only on the page. */
-  say(words: string): void;
+  showAnnouncement(words: string): void;
   /** Adds a button to the last announcement. */
   offer(words: string, label: string, act: () => void): void;
 }

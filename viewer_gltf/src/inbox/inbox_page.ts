@@ -109,11 +109,11 @@ export class InboxPage {
   private async take(dropped: Dropped): Promise<void> {
     try {
       const found = await dropped.files((count) =>
-        this.zone.say(`Listing the files: ${count} so far.`),
+        this.zone.showText(`Listing the files: ${count} so far.`),
       );
       await this.begin(found, await dropped.handles);
     } catch (error) {
-      this.zone.say(faultOf(error, "The files can't be read. Drop them again."), true);
+      this.zone.showText(faultOf(error, "The files can't be read. Drop them again."), true);
     }
   }
 
@@ -126,14 +126,14 @@ export class InboxPage {
     const files = new UploadFiles(found);
     const refusal = refusalOf(files.files.length, files.bytes, state.limits);
     if (refusal !== null) {
-      this.zone.say(refusal, true);
+      this.zone.showText(refusal, true);
       return;
     }
     const { id, offset } = await this.server.begin(files);
-    this.zone.say("");
+    this.zone.showText("");
     const known = this.uploads.get(id);
     if (known !== undefined && !known.isOver) {
-      this.zone.say("These files are being uploaded already.");
+      this.zone.showText("These files are being uploaded already.");
       return;
     }
     this.names.set(id, nameOf(files));
@@ -153,13 +153,13 @@ export class InboxPage {
 
   /** Sends an address to the server. Returns whether the server has accepted it. */
   private async takeAddress(address: string): Promise<boolean> {
-    this.zone.say("Sending the address to the server.");
+    this.zone.showText("Sending the address to the server.");
     try {
       await this.server.addAddress(address);
-      this.zone.say("");
+      this.zone.showText("");
       return true;
     } catch (error) {
-      this.zone.say(
+      this.zone.showText(
         faultOf(error, "The address could not be sent to the server. Try again."),
         true,
       );

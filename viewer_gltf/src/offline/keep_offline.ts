@@ -100,7 +100,7 @@ export class KeepOffline {
     document.documentElement.dataset.offline = isReady ? "ready" : "partly";
     // Only the first state and "ready" are announced; an announcement for each further tile would disturb.
     if (coverage !== null && (!this.hasAnnounced || (isReady && !this.isReady))) {
-      this.host.service("page")?.say(coverageText(coverage, length));
+      this.host.service("page")?.showAnnouncement(coverageText(coverage, length));
       this.hasAnnounced = true;
     }
     this.isReady = isReady;

@@ -39,7 +39,7 @@ class PagePart implements Part, PagePanel {
     this.html = new Panel((request) => this.perform(request));
     parent.append(this.html.root);
     this.keyboard = new Keyboard(host, this, parent, signal);
-    host.announced.subscribe((text) => this.say(text));
+    host.announced.subscribe((text) => this.showAnnouncement(text));
     host.revealed.subscribe((control) => this.html.reveal(control));
     host.changed.subscribe(() => this.refresh());
     host.panel.onChange(() => this.refresh());
@@ -63,7 +63,7 @@ class PagePart implements Part, PagePanel {
   }
 
   afterOverview(): void {
-    if (pixelShare() < 1) this.say(FEWER_PIXELS);
+    if (pixelShare() < 1) this.showAnnouncement(FEWER_PIXELS);
   }
 
   private refresh(): void {
@@ -99,8 +99,8 @@ class PagePart implements Part, PagePanel {
     return this.html.focus(control);
   }
 
-  say(words: string): void {
-    this.overlays.announcement.say(words);
+  showAnnouncement(words: string): void {
+    this.overlays.announcement.show(words);
   }
 
   offer(words: string, label: string, act: () => void): void {

@@ -119,7 +119,7 @@ export class Announcement {
   readonly root = element("div", { className: "announcement" }, {}, this.words);
   private timer = 0;
 
-  say(text: string): void {
+  show(text: string): void {
     this.write(text, SHOWN_MS);
   }
 
