@@ -3,14 +3,9 @@
  *
  *   npm run build && npm run bench-walk -- BUNDLE [--size 412x780]     CSS pixels
  *
- * The script presses the page's keys in headless Chromium. Nothing is drawn, which does not change the counts. It prints
- * these numbers at rest on each tile, and the largest triangle and byte counts of the walk:
- *
- * - the triangles on screen
- * - the bytes of volumes on the GPU
- * - the tiles with volumes
- *
- * The exit code is 1 if the gaze has missed a tile.
+ * The page is controlled by its keys in headless Chromium. Nothing is drawn, which does not change the counts. Prints
+ * the triangles on screen, the bytes of volumes on the GPU, and the number of tiles with volumes. There is a row for
+ * rest on each tile, and one for the largest numbers during the walk. The exit code is 1 if the gaze has missed a tile.
  */
 import { readFile } from "node:fs/promises";
 import { join, resolve } from "node:path";
