@@ -189,21 +189,21 @@ def constant(name: str, source: str) -> list[float]:
 
 def test_light_steps_and_dwell_are_those_of_the_viewer() -> None:
     march = MARCH.read_text("utf-8")
-    room = (VIEWER / "gpu" / "room_light.ts").read_text("utf-8")
+    scene_light = (VIEWER / "gpu" / "scene_light.ts").read_text("utf-8")
     lamps = {
         lamp: [[float(n) for n in part.split(",")] for part in (light, towards)]
         for lamp, light, towards in re.findall(
-            r"(\w+): \{ light: \[(.*?)\], towards: \[(.*?)\] \}", room
+            r"(\w+): \{ light: \[(.*?)\], towards: \[(.*?)\] \}", scene_light
         )
     }
     halves = {
         name: [float(n) for n in part.split(",")]
-        for name, part in re.findall(r"(sky|ground): \[(.*?)\]", room)
+        for name, part in re.findall(r"(sky|ground): \[(.*?)\]", scene_light)
     }
     for theirs, ours in (
         (lamps["key"][0], "KEY_LIGHT"), (lamps["fill"][0], "FILL_LIGHT"),
         (halves["sky"], "SKY_LIGHT"), (halves["ground"], "GROUND_LIGHT"),
-        (constant("GLOSS", room), "GLOSS"),
+        (constant("GLOSS", scene_light), "GLOSS"),
     ):  # fmt: skip
         assert constant(ours, march) == theirs
     shade = (VIEWER / "gpu" / "chunks" / "shade.glsl").read_text("utf-8")

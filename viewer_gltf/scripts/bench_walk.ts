@@ -21,7 +21,7 @@ const MAX_STEPS = 400;
 
 class Walk {
   /** The figures at rest, by the tile under the gaze. */
-  private readonly met = new Map<string, Snapshot>();
+  private readonly restByTile = new Map<string, Snapshot>();
   private readonly seen: Snapshot[] = [];
   private steps = 0;
 
@@ -31,7 +31,7 @@ class Walk {
   async begin(address: string): Promise<void> {
     await this.viewer.open(address);
     await this.viewer.settled();
-    this.say("the whole specimen", await this.viewer.snapshot());
+    this.printFigures("the whole specimen", await this.viewer.snapshot());
     await this.viewer.page.keyboard.press("z");
     for (let i = 0; i < 4; i++) await this.viewer.page.keyboard.press("+");
     await this.viewer.settled();
@@ -54,19 +54,19 @@ class Walk {
   }
 
   /** Prints the figures, and returns the exit code: 1 if a tile was missed. */
-  tell(tiles: readonly string[]): number {
-    for (const [tile, snapshot] of this.met) this.say(tile, snapshot);
+  report(tiles: readonly string[]): number {
+    for (const [tile, snapshot] of this.restByTile) this.printFigures(tile, snapshot);
     const most = (of: (each: Snapshot) => number) => Math.max(...this.seen.map(of));
     process.stdout.write(
       `  the most on the way: ${most(({ triangles }) => triangles)} triangles, ` +
         `${megabytes(most(({ volumeBytes }) => volumeBytes))} MB of volumes\n`,
     );
-    const missed = tiles.filter((tile) => !this.met.has(tile));
+    const missed = tiles.filter((tile) => !this.restByTile.has(tile));
     if (missed.length > 0) process.stdout.write(`  not gazed at: ${missed.join(", ")}\n`);
     return missed.length > 0 ? 1 : 0;
   }
 
-  private say(where: string, { triangles, volumeBytes, volumes }: Snapshot): void {
+  private printFigures(where: string, { triangles, volumeBytes, volumes }: Snapshot): void {
     const held = new Set(volumes.map(({ tile }) => tile)).size;
     process.stdout.write(
       `  ${where}: ${triangles} triangles, ${megabytes(volumeBytes)} MB of volumes, tiles: ${held}\n`,
@@ -83,13 +83,14 @@ class Walk {
 
   /** Presses a key; returns false if that has moved nothing. */
   private async step(key: string): Promise<boolean> {
-    if (++this.steps > MAX_STEPS) throw new Error("the walk meets no end");
+    if (++this.steps > MAX_STEPS)
+      throw new Error(`the walk did not end within ${MAX_STEPS} key presses`);
     const before = (await this.viewer.snapshot()).look;
     await this.viewer.page.keyboard.press(key);
     await this.viewer.still();
     const after = await this.viewer.snapshot();
     this.seen.push(after);
-    if (after.gazed !== null) this.met.set(after.gazed, after);
+    if (after.gazed !== null) this.restByTile.set(after.gazed, after);
     return after.look.target.some((v, i) => Math.abs(v - before.target[i]) > 1e-4);
   }
 }
@@ -124,7 +125,7 @@ try {
   const walk = new Walk(new ViewerPage(page));
   await walk.begin(`${host.address}/?bundle=bundle/&mode=disc&switch=9`);
   await walk.all();
-  process.exitCode = walk.tell(manifest.tiles.map(({ id }) => id));
+  process.exitCode = walk.report(manifest.tiles.map(({ id }) => id));
 } finally {
   await browser.close();
   await chromium.close();

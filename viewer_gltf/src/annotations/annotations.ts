@@ -14,8 +14,8 @@ import {
   pickHandle,
   TOLERANCE_RAD,
 } from "../marks/clip_handles";
+import { NO_EYE_VIEW } from "../marks/eye_view";
 import { dragLamp, isLampHandle, lampHandles } from "../marks/lamp_handles";
-import { NO_SIGHT } from "../marks/sight";
 import { umPerPixelAt } from "../marks/um_per_pixel";
 import type { Box } from "../math/box";
 import type { Clip } from "../math/clip";
@@ -67,7 +67,7 @@ export class Marks {
   readonly ruler = new Ruler();
   readonly axes: Axes;
   /** The eye of the last frame. */
-  private sight = NO_SIGHT;
+  private eyeView = NO_EYE_VIEW;
   /** The dragged lamp, while the ray passes beside the sphere on which the lamp moves; otherwise null. */
   private beside: HandleId | null = null;
   /** The clip with which the page opened. */
@@ -94,7 +94,7 @@ export class Marks {
     this.group.name = "marks";
     this.group.add(handles.group, lamps.group, measured.group);
     this.group.add(ruler.group, axes.group, name.group);
-    this.follow(state);
+    this.sync(state);
   }
 
   /** Elements that the page places over the canvas. */
@@ -107,7 +107,7 @@ export class Marks {
     return [this.group];
   }
 
-  follow(state: ViewerState): void {
+  sync(state: ViewerState): void {
     this.state = state;
     this.handles.show(markedClip(state.clip, this.opening, this.isPointedAt), this.shown);
     this.lamps.show(state, this.specimen);
@@ -119,7 +119,7 @@ export class Marks {
 
   /** Called for every frame, also if it is not drawn. */
   update(view: FrameView): void {
-    this.sight = view.sight;
+    this.eyeView = view.eyeView;
     this.target.specimen = view.specimen;
     this.cutAtEntry = view.screen === null ? (this.cutAtEntry ?? this.state.clip) : null;
     this.target.isCutAsleep = this.cutAtEntry === this.state.clip;
@@ -129,11 +129,11 @@ export class Marks {
     this.surfaces = surfaces;
     this.name.follow(view.gaze, TREMBLE_M / m_per_um, view.dt_s, () => this.nameOf(view.gaze));
     if (this.state.measured.length > 0) this.showMeasured(); // volumes load and refine, which changes the values
-    if (view.screen === null) this.updateInRoom(view);
+    if (view.screen === null) this.updateInStereo(view);
     else this.updateOnScreen(view, view.screen, m_per_um);
-    this.handles.update(this.sight);
-    this.lamps.update(this.sight);
-    this.measured.update(this.sight);
+    this.handles.update(this.eyeView);
+    this.lamps.update(this.eyeView);
+    this.measured.update(this.eyeView);
   }
 
   /** For each measured point, the loaded values of the shown channels, such as `DAPI 1210`. */
@@ -154,7 +154,7 @@ export class Marks {
   /** Returns the handle that a ray in um points at. */
   pick(ray: Ray, pointing: Pointing): HandleId | null {
     this.showHandles();
-    return pickHandle(ray, this.target.handles, this.sight.zoom * TOLERANCE_RAD[pointing]);
+    return pickHandle(ray, this.target.handles, this.eyeView.zoom * TOLERANCE_RAD[pointing]);
   }
 
   /** Drags a handle along with a ray in um. */
@@ -192,7 +192,7 @@ export class Marks {
     if (this.isPointedAt) return;
     this.isPointedAt = true;
     if (this.state.clip !== this.opening) return;
-    this.follow(this.state);
+    this.sync(this.state);
     this.options.onChange();
   }
 
@@ -205,17 +205,17 @@ export class Marks {
     return this.options.manifest.specimen.bounds_um;
   }
 
-  private updateInRoom({ isPanelOpen, isBarBelow }: FrameView): void {
-    const { sight, shown } = this;
+  private updateInStereo({ isPanelOpen, isBarBelow }: FrameView): void {
+    const { eyeView, shown } = this;
     this.showHandles();
     this.highlight(this.target.takeSeen());
     this.scaleBar.update(null);
     this.orientation.root.style.display = "none";
-    this.ruler.update(shown, sight, isBarBelow);
+    this.ruler.update(shown, eyeView, isBarBelow);
     if (isPanelOpen) this.ruler.group.visible = false;
     this.axes.group.visible = !isPanelOpen;
-    this.axes.update(shown, sight);
-    this.name.placeInRoom(sight);
+    this.axes.update(shown, eyeView);
+    this.name.placeInStereo(eyeView);
   }
 
   private updateOnScreen(

@@ -24,6 +24,7 @@ import {
   BRIGHT,
   DIM,
   disposeMarks,
+  type EyeView,
   HANDLE_RADIUS,
   HIGHLIGHT_SCALE,
   lengthAt,
@@ -33,7 +34,6 @@ import {
   markMesh,
   PLANE,
   rimmed,
-  type Sight,
 } from "../marks/style";
 import type { Box } from "../math/box";
 import type { Clip, ClipPlane } from "../math/clip";
@@ -106,10 +106,10 @@ export class ClipMark {
     return true;
   }
 
-  update(sight: Sight): void {
+  update(eyeView: EyeView): void {
     for (const [id, mesh] of this.handles) {
       if (!mesh.visible) continue;
-      const size = lengthAt(mesh.position, sight, 2 * HANDLE_RADIUS);
+      const size = lengthAt(mesh.position, eyeView, 2 * HANDLE_RADIUS);
       mesh.scale.setScalar(id === this.highlighted ? HIGHLIGHT_SCALE * size : size);
     }
   }

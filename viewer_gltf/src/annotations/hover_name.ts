@@ -7,7 +7,7 @@ import { Object3D, Vector3 } from "three";
 import { element } from "../dom/element";
 import { advanceRest, type Rest } from "../interaction/ray_at_rest";
 import { Label } from "../marks/label";
-import type { Sight } from "../marks/style";
+import type { EyeView } from "../marks/style";
 import type { Ray } from "../math/vec3";
 import type { Probed } from "../probe/probe";
 
@@ -74,10 +74,10 @@ export class NameMark {
     this.root.hidden = this.text === "";
   }
 
-  placeInRoom(sight: Sight): void {
+  placeInStereo(eyeView: EyeView): void {
     this.root.hidden = true;
     this.label.write(this.text);
-    this.label.place(this.at, sight);
+    this.label.place(this.at, eyeView);
   }
 
   private write(text: string): void {

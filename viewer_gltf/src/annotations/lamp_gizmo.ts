@@ -6,13 +6,13 @@ import { LAMP_HANDLES, type LampHandleId, type LitState, lampHandles } from "../
 import {
   BRIGHT,
   disposeMarks,
+  type EyeView,
   HANDLE_RADIUS,
   HIGHLIGHT_SCALE,
   lengthAt,
   type MarkMesh,
   markMesh,
   rimmed,
-  type Sight,
 } from "../marks/style";
 import { type Box, boxSpan } from "../math/box";
 
@@ -60,16 +60,16 @@ export class LampMark {
     this.highlighted = id;
   }
 
-  update(sight: Sight): void {
-    const { eye_um } = sight;
+  update(eyeView: EyeView): void {
+    const { eye_um } = eyeView;
     for (const [id, { mesh, label }] of this.balls) {
       if (!mesh.visible) continue;
-      const size = lengthAt(mesh.position, sight, 2 * HANDLE_RADIUS);
+      const size = lengthAt(mesh.position, eyeView, 2 * HANDLE_RADIUS);
       mesh.scale.setScalar(id === this.highlighted ? HIGHLIGHT_SCALE * size : size);
       const direction = this.way.subVectors(mesh.position, eye_um).toArray();
       const ray = { origin: eye_um.toArray(), direction };
       mesh.material.opacity = boxSpan([0, 1], ray, this.specimen) === null ? 1 : BEHIND;
-      label.place(mesh.position, sight);
+      label.place(mesh.position, eyeView);
     }
   }
 

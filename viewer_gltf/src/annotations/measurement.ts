@@ -4,6 +4,7 @@ import { keepApart } from "../marks/keep_apart";
 import { Label } from "../marks/label";
 import {
   disposeMarks,
+  type EyeView,
   LINE_RADIUS,
   lengthAt,
   type MarkMesh,
@@ -11,7 +12,6 @@ import {
   markMesh,
   POINT_RADIUS,
   rimmed,
-  type Sight,
 } from "../marks/style";
 import type { Vec3 } from "../math/vec3";
 import { measurementText } from "../probe/measure";
@@ -76,15 +76,15 @@ class MeasurementLine {
     return this.points[index].position;
   }
 
-  update(sight: Sight): void {
+  update(eyeView: EyeView): void {
     for (const mesh of this.points) {
-      mesh.scale.setScalar(lengthAt(mesh.position, sight, 2 * POINT_RADIUS));
+      mesh.scale.setScalar(lengthAt(mesh.position, eyeView, 2 * POINT_RADIUS));
     }
     for (const mesh of this.segments) {
-      const width = lengthAt(mesh.position, sight, 2 * LINE_RADIUS);
+      const width = lengthAt(mesh.position, eyeView, 2 * LINE_RADIUS);
       mesh.scale.setX(width).setZ(width);
     }
-    this.label.place(this.middle, sight);
+    this.label.place(this.middle, eyeView);
   }
 
   dispose(): void {
@@ -183,24 +183,24 @@ export class MeasureMark {
     this.key = "";
   }
 
-  update(sight: Sight): void {
+  update(eyeView: EyeView): void {
     for (const { label } of [this.newest, ...this.finished]) label.shift(0);
-    this.newest.update(sight);
-    for (const line of this.finished) line.update(sight);
+    this.newest.update(eyeView);
+    for (const line of this.finished) line.update(eyeView);
     for (let i = 0; i < this.count; i++) {
       // the values stand on the side of the point that leads away from the line, so that they do not cover the result
       const before = i === 0 ? 0 : i - 1;
       const { isLine } = this.newest;
-      const leadsDown = isLine && this.newest.along(before, this.segment).dot(sight.up) < 0;
+      const leadsDown = isLine && this.newest.along(before, this.segment).dot(eyeView.up) < 0;
       const isAbove = isLine && (i === 0) === leadsDown;
       this.values[i].turnTo(isAbove ? "above" : "below");
-      this.values[i].place(this.newest.placeOf(i), sight);
+      this.values[i].place(this.newest.placeOf(i), eyeView);
     }
-    this.keepLabelsApart(sight);
+    this.keepLabelsApart(eyeView);
   }
 
   /** Shifts labels that would overlap. The newest measurement's labels stay, and the others make way. */
-  private keepLabelsApart(sight: Sight): void {
+  private keepLabelsApart(eyeView: EyeView): void {
     const finished = this.finished.map(({ label }) => label);
     const labels = [this.newest.label, ...this.values, ...finished].filter(
       ({ sprite }) => sprite.visible,
@@ -209,10 +209,10 @@ export class MeasureMark {
     const { ahead, right, up } = this;
     ahead.set(0, 0, 0);
     for (const { sprite } of labels) ahead.add(sprite.position);
-    ahead.divideScalar(labels.length).sub(sight.eye_um).normalize();
-    right.crossVectors(ahead, sight.up).normalize();
+    ahead.divideScalar(labels.length).sub(eyeView.eye_um).normalize();
+    right.crossVectors(ahead, eyeView.up).normalize();
     up.crossVectors(right, ahead);
-    const shifts = keepApart(labels.map((label) => label.boxFrom(sight, right, up)));
+    const shifts = keepApart(labels.map((label) => label.boxFrom(eyeView, right, up)));
     labels.forEach((label, i) => {
       label.shift(shifts[i]);
     });

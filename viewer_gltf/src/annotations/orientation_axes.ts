@@ -10,11 +10,11 @@ import { Label } from "../marks/label";
 import {
   AXIS_COLORS,
   disposeMarks,
+  type EyeView,
   lengthAt,
   type MarkMesh,
   markOf,
   type Piece,
-  type Sight,
 } from "../marks/style";
 import type { Box } from "../math/box";
 
@@ -140,10 +140,10 @@ export class Axes {
   }
 
   /** Places the axes to the left of the lower front corner of the shown box, in um. */
-  update({ min, max }: Box, sight: Sight): void {
+  update({ min, max }: Box, eyeView: EyeView): void {
     const aside = GAP * Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
     this.arrows.position.set(min[0] - aside, min[1] - aside / 2, max[2]);
-    const length = lengthAt(this.arrows.position, sight, ARROW_RAD);
+    const length = lengthAt(this.arrows.position, eyeView, ARROW_RAD);
     if (this.isCross) this.arrows.position.x -= length;
     this.arrows.scale.setScalar(length);
     for (const { direction, label } of this.arms) {
@@ -151,7 +151,7 @@ export class Axes {
         .copy(direction)
         .multiplyScalar(1.1 * length)
         .add(this.arrows.position);
-      label.place(this.tip, sight);
+      label.place(this.tip, eyeView);
     }
   }
 

@@ -48,7 +48,8 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
       stage,
       host.canvas,
       {
-        pick: (point, pointing) => (host.isInRoom ? null : marks.pick(host.rayAt(point), pointing)),
+        pick: (point, pointing) =>
+          host.isInStereo ? null : marks.pick(host.rayAt(point), pointing),
         drag: (id, point) => marks.drag(id, host.rayAt(point)),
         highlight: (id) => marks.highlight(id),
       },
@@ -62,9 +63,9 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
   }
 
   sync(state: ViewerState, previous: ViewerState): void {
-    this.marks.follow(state);
+    this.marks.sync(state);
     const lamps = this.lampsOf(state);
-    if (lamps.length > this.lampsOf(previous).length && !this.host.isInRoom) {
+    if (lamps.length > this.lampsOf(previous).length && !this.host.isInStereo) {
       // new lamps may lie beside or behind the camera; in stereo the user turns the head to find them
       this.host.viewpoint.stepBackFor(lamps.map(({ position }) => position));
     }

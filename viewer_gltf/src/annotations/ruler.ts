@@ -8,10 +8,10 @@ import {
   BRIGHT,
   DIM,
   disposeMarks,
+  type EyeView,
   lengthAt,
   markOf,
   type Piece,
-  type Sight,
 } from "../marks/style";
 import type { Box } from "../math/box";
 import { chooseScaleBar, LONGEST_PX } from "../math/round_length";
@@ -48,20 +48,20 @@ export class Ruler {
    *
    * @param shown box of the shown specimen, um
    */
-  update(shown: Box, sight: Sight, isAbove = false): void {
+  update(shown: Box, eyeView: EyeView, isAbove = false): void {
     const { min, max } = shown;
     const gap = GAP * Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
     this.at.set((min[0] + max[0]) / 2, isAbove ? max[1] + gap : min[1] - gap, max[2]);
     this.label.turnTo(isAbove ? "above" : "below");
-    const chosen = rulerLength(this.at.distanceTo(sight.eye_um));
+    const chosen = rulerLength(this.at.distanceTo(eyeView.eye_um));
     this.group.visible = chosen !== null;
     if (chosen === null) return;
     this.length_um = chosen.length_um;
-    const thickness = lengthAt(this.at, sight, THICKNESS_RAD);
+    const thickness = lengthAt(this.at, eyeView, THICKNESS_RAD);
     this.bar.position.copy(this.at);
     this.bar.scale.set(chosen.length_um, thickness, thickness);
     this.label.write(chosen.label);
-    this.label.place(this.at, sight);
+    this.label.place(this.at, eyeView);
   }
 
   dispose(): void {

@@ -28,7 +28,7 @@ for (const kind of ["pointerdown", "pointerup", "pointercancel"]) {
 function isInUse(host: Host): boolean {
   const { activeElement } = document;
   const isTyping = activeElement instanceof HTMLInputElement && activeElement.type === "text";
-  return host.isInRoom || pointersDown > 0 || isTyping;
+  return host.isInStereo || pointersDown > 0 || isTyping;
 }
 
 /** Resolves once the user would not notice a change. */

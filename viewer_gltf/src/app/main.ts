@@ -163,7 +163,7 @@ async function openIn(
 
   const host = makeHost(parent, bundle);
   followSystem(host, search);
-  host.panel.learn({ subtitle: describeSize(bundle.manifest) });
+  host.panel.addFacts({ subtitle: describeSize(bundle.manifest) });
   place(host);
   await host.noteOpening();
   return host;

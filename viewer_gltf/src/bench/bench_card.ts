@@ -21,12 +21,12 @@ export type BenchOptions = Readonly<{
 
 export function benchCard(flight_s: number, options: BenchOptions): HTMLElement {
   const { subject, stereo, startStereo } = options;
-  const told = element(
+  const status = element(
     "p",
     {
       textContent:
         "The specimen flies once around and towards you, in every mode and at every size of its volumes. " +
-        "Keep this page in front until the table is there.",
+        "Keep this page visible until the table appears.",
     },
     {},
   );
@@ -42,7 +42,7 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
     { className: "bench", ariaLabel: "Benchmark" },
     { bench: "card" },
     element("h2", { textContent: "How fast is this device?" }),
-    told,
+    status,
     ...buttons,
   );
   buttons.forEach((button, i) => {
@@ -56,18 +56,18 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
     try {
       // Stereo is requested within the tap, since browsers allow it only then.
       const begun = kind === null ? null : await startStereo(kind).then(() => kind, refused);
-      const report = await runAll(subject, begun, flight_s, (step) => setText(told, words(step)));
+      const report = await runAll(subject, begun, flight_s, (step) => setText(status, words(step)));
       await subject.endStereo();
       options.onReport(report);
-      told.remove();
+      status.remove();
       card.append(...resultOf(report));
     } catch (error) {
-      setText(told, `The benchmark ended early: ${String(error)}`);
+      setText(status, `The benchmark ended early: ${String(error)}`);
       throw error;
     }
   };
   const refused = (error: unknown) => {
-    card.append(element("p", { textContent: `No stereo: ${String(error)}` }));
+    card.append(element("p", { textContent: `Stereo could not start: ${String(error)}` }));
     return null;
   };
   return card;
@@ -81,7 +81,7 @@ function words({ index, count, mode, eyes, edge }: Step): string {
 }
 
 function resultOf(report: Report): readonly HTMLElement[] {
-  const canvas = element("canvas", { ariaLabel: "Frames a second by volume size" });
+  const canvas = element("canvas", { ariaLabel: "Frames per second by volume size" });
   canvas.role = "img";
   drawChart(canvas, report);
   const head = ["mode", "eyes", "voxels", "frames/s", "median ms", "95 % ms", "draw calls"];

@@ -36,7 +36,7 @@ export function drawChart(canvas: HTMLCanvasElement, report: Report): void {
   pen.fillRect(0, 0, WIDTH, HEIGHT);
   pen.font = "600 16px system-ui, sans-serif";
   pen.fillStyle = INK;
-  pen.fillText("Frames a second by volume size", PLOT.left, 28);
+  pen.fillText("Frames per second by volume size", PLOT.left, 28);
   pen.font = "12px system-ui, sans-serif";
   pen.fillStyle = DIM;
   const { renderer, picture_px } = report.device;

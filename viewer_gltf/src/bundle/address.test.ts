@@ -50,6 +50,6 @@ describe("the source's address", () => {
       const page = `https://host/?source=${encodeURIComponent(wrong)}`;
       expect(() => sourceAddress(page)).toThrow("expected an image's address on the web");
     }
-    expect(() => sourceAddress("https://host/?source=x.zarr&bundle=y/")).toThrow("found both");
+    expect(() => sourceAddress("https://host/?source=x.zarr&bundle=y/")).toThrow("are both given");
   });
 });

@@ -39,13 +39,15 @@ export function sourceAddress(page: string): string | null {
   const named = asked.get("source");
   if (globalThis.stereocellHost?.bundle !== undefined || !named) return null;
   if (asked.has("bundle")) {
-    throw new BundleError("?source= and ?bundle=: found both, expected one of them");
+    throw new BundleError(
+      "?source= and ?bundle= are both given, expected one of them: remove the other",
+    );
   }
   const url = URL.canParse(named, page) ? new URL(named, page) : null;
   if (url === null || !/^https?:$/.test(url.protocol)) {
     throw new BundleError(
-      `?source=: expected an image's address on the web, https://, found "${named}": ` +
-        "for other places, use stereocell view",
+      `?source= is "${named}", expected an image's address on the web, https://: open files and other ` +
+        "places with stereocell view",
     );
   }
   url.hash = "";
@@ -69,7 +71,7 @@ export function bundleAddress(page: string): string {
   if (named === null || named === "") return new URL("./", page).href.split(/[?#]/)[0];
   const url = URL.canParse(named, page) ? new URL(named, page) : null;
   if (url === null || !/^https?:$/.test(url.protocol)) {
-    throw new BundleError(`?bundle=: expected a folder's address on the web, found "${named}"`);
+    throw new BundleError(`?bundle= is "${named}", expected a folder's address on the web`);
   }
   if (url.pathname.endsWith("/manifest.json")) url.pathname = url.pathname.slice(0, -13);
   if (!url.pathname.endsWith("/")) url.pathname += "/";

@@ -19,7 +19,7 @@ function unzstd(frame: Uint8Array, bytes: number, part: number): Uint8Array {
   try {
     decoded = decoder.decode(frame, bytes);
   } catch {
-    throw new PartFault(part, "the zstd stream is broken");
+    throw new PartFault(part, "found a damaged zstd stream");
   }
   if (decoded.length === bytes) return decoded;
   throw new PartFault(part, `found ${decoded.length} texel bytes, expected ${bytes}`);

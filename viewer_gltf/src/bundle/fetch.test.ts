@@ -47,7 +47,7 @@ describe("a request", () => {
 
   it.each([
     ["", "can't be reached, or forbids this page"],
-    [503, "answers 503"],
+    [503, "answers with status 503"],
   ])("that fails for the host's sake (%s) is reported once for all", async (status, fault) => {
     vi.useFakeTimers();
     vi.stubGlobal("fetch", async () => {
@@ -62,7 +62,7 @@ describe("a request", () => {
     for (const each of await failed) {
       const { reason } = each as PromiseRejectedResult;
       expect(reason).toBeInstanceOf(TemporaryError);
-      expect(reason.notice).toBe(`The host host ${fault}: not all files have come.`);
+      expect(reason.notice).toBe(`The host host ${fault}: some files are missing.`);
     }
   });
 

@@ -37,7 +37,7 @@ export function request(url: string, path: string, options: RequestInit = {}): P
 
 /** Returns the notice for a host's fault; it names no file, so that one notice serves for all missing files. */
 function noticeOf(url: string, fault: string): string {
-  return `The host ${new URL(url).host} ${fault}: not all files have come.`;
+  return `The host ${new URL(url).host} ${fault}: some files are missing.`;
 }
 
 async function requestOnce(url: string, path: string, options: RequestInit): Promise<Response> {
@@ -55,9 +55,9 @@ async function requestOnce(url: string, path: string, options: RequestInit): Pro
   if (response.status === 404) throw new MissingError(`${path}: not found (404) at ${url}`);
   if (!response.ok) {
     const { status } = response;
-    const message = `${path}: the host answered ${status} for ${url}`;
+    const message = `${path}: the host answered with status ${status} for ${url}`;
     if (status !== BUSY && status < FIRST_SERVER_FAULT) throw new BundleError(message);
-    throw new TemporaryError(message, { notice: noticeOf(url, `answers ${status}`) });
+    throw new TemporaryError(message, { notice: noticeOf(url, `answers with status ${status}`) });
   }
   return response;
 }
@@ -71,7 +71,7 @@ export async function readBody(response: Response, path: string): Promise<Uint8A
     const { url } = response; // "" for a response that the page itself has made
     throw new TemporaryError(`${path}: the connection broke before the file's end`, {
       cause: error,
-      notice: url === "" ? undefined : noticeOf(url, "breaks the connection off"),
+      notice: url === "" ? undefined : noticeOf(url, "closes the connection too early"),
     });
   }
 }
@@ -134,7 +134,7 @@ export async function fetchPart(
 export async function checkFile(file: FileRef, bytes: Uint8Array<ArrayBuffer>): Promise<void> {
   if (bytes.length !== file.bytes) {
     throw new BundleError(
-      `${file.path}: found ${bytes.length} bytes, expected ${file.bytes} (a broken upload?)`,
+      `${file.path}: found ${bytes.length} bytes, expected ${file.bytes}: upload the file again`,
     );
   }
   await checkHash(file.path, bytes, file.sha256);
@@ -147,9 +147,12 @@ export function parseJson(text: string, path: string): unknown {
   } catch (error) {
     if (!(error instanceof SyntaxError)) throw error;
     if (/^\s*[{[]/.test(text)) {
-      throw new BundleError(`${path}: the JSON is broken or cut short (${error.message})`, {
-        cause: error,
-      });
+      throw new BundleError(
+        `${path}: found damaged or incomplete JSON (${error.message}): upload the file again`,
+        {
+          cause: error,
+        },
+      );
     }
     const start = text.trim().slice(0, 40).replace(/\s+/g, " ");
     throw new BundleError(`${path}: found "${start}", expected JSON`, { cause: error });

@@ -31,18 +31,19 @@ export function readTexture(
   try {
     texture = read(file);
   } catch (error) {
-    throw new BundleError(`${path}: expected a KTX2 texture (${String(error)})`, { cause: error });
+    throw new BundleError(
+      `${path}: found another kind of file (${String(error)}), expected a KTX2 texture`,
+      { cause: error },
+    );
   }
   if (texture.vkFormat !== FORMATS[format].vk) {
     throw new BundleError(
-      `${path}: vkFormat: found ${texture.vkFormat}, expected ${FORMATS[format].vk} (${format})`,
+      `${path}: vkFormat is ${texture.vkFormat}, expected ${FORMATS[format].vk} (${format})`,
     );
   }
   const found = [texture.pixelWidth, texture.pixelHeight, texture.pixelDepth || 1];
   if (found.some((n, i) => n !== size[i])) {
-    throw new BundleError(
-      `${path}: size: found ${found.join(" x ")}, expected ${size.join(" x ")}`,
-    );
+    throw new BundleError(`${path}: size is ${found.join(" x ")}, expected ${size.join(" x ")}`);
   }
   return texture;
 }
@@ -78,7 +79,7 @@ export async function readLevel(
       return new Uint8Array(level.levelData);
     default:
       throw new BundleError(
-        `${path}: supercompression: found scheme ${texture.supercompressionScheme}, expected zstd or none`,
+        `${path}: supercompression scheme is ${texture.supercompressionScheme}, expected zstd or none`,
       );
   }
 }

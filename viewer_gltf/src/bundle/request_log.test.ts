@@ -2,7 +2,7 @@ import { expect, it, vi } from "vitest";
 
 it("logs each address and range once, and whether it was answered", async () => {
   vi.resetModules(); // other tests of this process have added to the log
-  const { noteAsked, allAsked, allCome } = await import("./request_log");
+  const { noteAsked, allAsked, allAnswered } = await import("./request_log");
   noteAsked("https://host/a", undefined);
   noteAsked("https://host/a", { Range: "bytes=0-9" });
   noteAsked("https://host/a", { range: "bytes=0-9" }, true);
@@ -11,5 +11,5 @@ it("logs each address and range once, and whether it was answered", async () => 
     { url: "https://host/a", range: null },
     { url: "https://host/a", range: "bytes=0-9" },
   ]);
-  expect(allCome()).toEqual([{ url: "https://host/a", range: "bytes=0-9" }]);
+  expect(allAnswered()).toEqual([{ url: "https://host/a", range: "bytes=0-9" }]);
 });

@@ -4,14 +4,14 @@
 export type Asked = Readonly<{ url: string; range: string | null }>;
 
 /** Requests by address and range, and whether each has been answered. */
-const log = new Map<string, Readonly<{ asked: Asked; hasCome: boolean }>>();
+const log = new Map<string, Readonly<{ asked: Asked; hasAnswer: boolean }>>();
 
 export const keyOf = ({ url, range }: Asked) => `${url} ${range}`;
 
-export function noteAsked(url: string, headers: HeadersInit | undefined, hasCome = false): void {
+export function noteAsked(url: string, headers: HeadersInit | undefined, hasAnswer = false): void {
   const asked = { url, range: new Headers(headers).get("Range") };
   const before = log.get(keyOf(asked));
-  log.set(keyOf(asked), { asked, hasCome: hasCome || before?.hasCome === true });
+  log.set(keyOf(asked), { asked, hasAnswer: hasAnswer || before?.hasAnswer === true });
 }
 
 export function allAsked(): readonly Asked[] {
@@ -19,6 +19,6 @@ export function allAsked(): readonly Asked[] {
 }
 
 /** Returns the requests that the host has answered. */
-export function allCome(): readonly Asked[] {
-  return [...log.values()].filter(({ hasCome }) => hasCome).map(({ asked }) => asked);
+export function allAnswered(): readonly Asked[] {
+  return [...log.values()].filter(({ hasAnswer }) => hasAnswer).map(({ asked }) => asked);
 }

@@ -41,11 +41,11 @@ describe("the manifest's check", () => {
 
   it("reports a wrong format and a wrong version with the found and the expected value", () => {
     expect(() => checkManifest({ ...MANIFEST, format: "tileset" })).toThrow(
-      'manifest.json: format: expected "stereocell-bundle", found "tileset"',
+      'manifest.json: format is "tileset", expected "stereocell-bundle"',
     );
-    expect(() => checkManifest([])).toThrow("found none");
+    expect(() => checkManifest([])).toThrow("format is missing");
     expect(() => checkManifest({ ...MANIFEST, version: 7 })).toThrow(
-      "manifest.json: version: this viewer reads version 1, found 7",
+      "manifest.json: version is 7, expected 1",
     );
   });
 
@@ -61,7 +61,7 @@ describe("the manifest's check", () => {
 
   it("refuses a bundle without channels with a message of one line", () => {
     expect(() => checkManifest({ ...MANIFEST, channels: [] })).toThrow(
-      /^manifest\.json: channels: the bundle holds none, so nothing can be shown$/,
+      /^manifest\.json: channels is empty, expected at least one channel: build the bundle again$/,
     );
   });
 
@@ -87,7 +87,7 @@ describe("other JSON", () => {
   it("is reported as such if it is cut short", () => {
     const text = JSON.stringify(MANIFEST).slice(0, 200);
     expect(() => parseJson(text, "manifest.json")).toThrow(
-      /^manifest\.json: the JSON is broken or cut short \(/,
+      /^manifest\.json: found damaged or incomplete JSON \(/,
     );
   });
 });

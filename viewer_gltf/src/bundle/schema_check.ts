@@ -34,22 +34,22 @@ function fieldOf(value: unknown, key: string): unknown {
 export function checkManifest(value: unknown): Manifest {
   const format = fieldOf(value, "format");
   if (format !== FORMAT) {
-    const found = format === undefined ? "none" : JSON.stringify(format);
-    throw new BundleError(`manifest.json: format: expected "${FORMAT}", found ${found}`);
+    const found = format === undefined ? "missing" : JSON.stringify(format);
+    throw new BundleError(`manifest.json: format is ${found}, expected "${FORMAT}"`);
   }
   const version = fieldOf(value, "version");
   if (version !== VERSION) {
-    const found = version === undefined ? "none" : JSON.stringify(version);
+    const found = version === undefined ? "missing" : JSON.stringify(version);
     throw new BundleError(
-      `manifest.json: version: this viewer reads version ${VERSION}, found ${found}; ` +
-        "open the bundle with the viewer it was built with",
+      `manifest.json: version is ${found}, expected ${VERSION}: open the bundle with the viewer of the ` +
+        "program that built it",
     );
   }
   checkSchema(bundleSchema, value, "manifest.json");
   const manifest = value as Manifest;
   if (manifest.channels.length === 0) {
     throw new BundleError(
-      "manifest.json: channels: the bundle holds none, so nothing can be shown",
+      "manifest.json: channels is empty, expected at least one channel: build the bundle again",
     );
   }
   return manifest;
@@ -67,7 +67,7 @@ export function checkTransfer2d(value: unknown, path: string): ChannelTransfer2D
   const checked = value as ChannelTransfer2D;
   for (const [name, shapes] of Object.entries(checked.functions)) {
     if (shapes.length > MAX_SHAPES) {
-      const found = `expected at most ${MAX_SHAPES} shapes, found ${shapes.length}`;
+      const found = `found ${shapes.length} shapes, expected at most ${MAX_SHAPES}`;
       throw new BundleError(`${path}: functions.${name}: ${found}`);
     }
     shapes.forEach((shape, i) => {

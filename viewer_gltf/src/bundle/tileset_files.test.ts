@@ -45,7 +45,9 @@ describe("a tileset", () => {
       { asset, root: { children: 1 } },
     ];
     for (const wrong of [...wrongs, { asset: {}, root: { children: [] } }]) {
-      expect(() => checkTileset(wrong, "t.json")).toThrow("t.json: expected a 3D Tiles tileset");
+      expect(() => checkTileset(wrong, "t.json")).toThrow(
+        "t.json: found JSON without asset.version or root",
+      );
     }
   });
 

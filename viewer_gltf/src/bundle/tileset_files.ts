@@ -17,7 +17,7 @@ export function checkGlb(bytes: Uint8Array, path: string): void {
   const length = view.getUint32(8, true);
   if (length !== bytes.length) {
     throw new BundleError(
-      `${path}: found ${bytes.length} bytes, expected ${length} (a broken upload?)`,
+      `${path}: found ${bytes.length} bytes, expected ${length}: upload the file again`,
     );
   }
 }
@@ -31,7 +31,7 @@ async function fetchGlb(
 ): Promise<ArrayBuffer> {
   const response = await request(fileAddress(base, path), path, { signal });
   const bytes = await readBody(response, path);
-  checkGlb(bytes, path); // first, since its message is clearer for a file that is cut short than that of the hash
+  checkGlb(bytes, path); // before the hash, because the message for an incomplete file is clearer
   await checkHash(path, bytes, hash, SHA_256_128);
   return bytes.buffer;
 }
@@ -50,7 +50,9 @@ export function checkTileset(value: unknown, path: string): Tileset {
   const { root } = tileset ?? {};
   const isTile = typeof root === "object" && root !== null && Array.isArray(root.children ?? []);
   if (typeof tileset?.asset?.version !== "string" || !isTile) {
-    throw new BundleError(`${path}: expected a 3D Tiles tileset with asset.version and root`);
+    throw new BundleError(
+      `${path}: found JSON without asset.version or root, expected a 3D Tiles tileset`,
+    );
   }
   return tileset as Tileset;
 }
@@ -128,15 +130,15 @@ export class TilesetFiles {
   /** Returns a tileset, or the bytes of a surface. Throws BundleError, or AbortError. */
   async fetch(address: string, signal?: AbortSignal | null): Promise<Tileset | ArrayBuffer> {
     const { base, file } = this;
-    if (address === this.root) return this.learn(await fetchTileset(base, file), address);
+    if (address === this.root) return this.readHashes(await fetchTileset(base, file), address);
     const hash = this.hashes.get(address);
     if (hash === undefined) throw new Error(`${address} is not in its tileset`);
     const path = this.nameOf(address);
     if (!path.endsWith(".json")) return fetchGlb(base, path, hash, signal);
-    return this.learn(await fetchExternal(base, path, hash, signal), address);
+    return this.readHashes(await fetchExternal(base, path, hash, signal), address);
   }
 
-  private learn(tileset: Tileset, address: string): Tileset {
+  private readHashes(tileset: Tileset, address: string): Tileset {
     const found = contentHashes(tileset, this.nameOf(address), address);
     for (const [each, hash] of found) this.hashes.set(each, hash);
     // The renderer warns about version 1.1. A bundle uses only one new feature of it, glTF content, which works.

@@ -29,11 +29,12 @@ export type Transfer2d = Readonly<Omit<ChannelTransfer2D, "functions" | "histogr
 
 /** Returns the fault of a shape from a file or a link; null if it has none. */
 export function faultOf(shape: Shape): string | null {
-  if (shape.kind !== "rectangle" && shape.kind !== "triangle") return `kind is ${shape.kind}`;
+  if (shape.kind !== "rectangle" && shape.kind !== "triangle")
+    return `kind is ${shape.kind}, expected rectangle or triangle`;
   for (const name of ["values", "gradients"] as const) {
     const [low, high] = shape[name];
     if (!(0 <= low && low < high && high <= 1)) {
-      return `${name} are (${low}, ${high}), expected them to rise within 0..1`;
+      return `${name} are (${low}, ${high}), expected two rising numbers within 0..1`;
     }
   }
   const numbers = { tip: shape.tip, opacity: shape.opacity, softness: shape.softness };

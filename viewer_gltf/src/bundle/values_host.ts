@@ -45,8 +45,8 @@ export class ValuesHost {
 
   private async fetch(key: string): Promise<number | null> {
     const response = await request(fileAddress(this.address, key), key, { cache: "no-store" });
-    const told = parseJson(new TextDecoder().decode(await readBody(response, key)), key);
-    const value = (told as { value?: unknown } | null)?.value;
+    const answer = parseJson(new TextDecoder().decode(await readBody(response, key)), key);
+    const value = (answer as { value?: unknown } | null)?.value;
     return typeof value === "number" && Number.isFinite(value) ? value : null;
   }
 }

@@ -106,7 +106,7 @@ class CapturePart implements Part, PosterMaker {
     make: (signal: AbortSignal) => Promise<Made>,
   ): Promise<void> {
     const { host } = this;
-    if (host.isInRoom) {
+    if (host.isInStereo) {
       host.announce(ON_THE_SCREEN);
       return;
     }
@@ -137,14 +137,14 @@ class CapturePart implements Part, PosterMaker {
   }
 
   private keep(): boolean {
-    const { state, isInRoom, viewpoint } = this.host;
-    if (isInRoom) return false;
+    const { state, isInStereo, viewpoint } = this.host;
+    if (isInStereo) return false;
     this.setViews([...state.keptViews, viewpoint.cameraPose]);
     return true;
   }
 
   private forget(): boolean {
-    if (this.host.isInRoom) return false;
+    if (this.host.isInStereo) return false;
     this.setViews([]);
     return true;
   }
@@ -161,9 +161,9 @@ class CapturePart implements Part, PosterMaker {
   }
 
   private goToNext(): boolean {
-    const { state, isInRoom, undo, viewpoint } = this.host;
+    const { state, isInStereo, undo, viewpoint } = this.host;
     const { keptViews } = state;
-    if (isInRoom || keptViews.length === 0) return false;
+    if (isInStereo || keptViews.length === 0) return false;
     undo.noteCameraMove();
     const before = viewpoint.cameraPose;
     const { name, ...look } = keptViews[this.nextView++ % keptViews.length];

@@ -13,13 +13,13 @@ const halfTan = (degrees: number) => Math.tan((degrees * Math.PI) / 360);
  */
 export function stageViews({ views, specimen }: Manifest): readonly KeptView[] {
   const { center, scale } = place(specimen.bounds_um);
-  const inRoom = (point: Vec3): Vec3 => [
+  const toScene = (point: Vec3): Vec3 => [
     (point[0] - center[0]) * scale,
     (point[1] - center[1]) * scale,
     (point[2] - center[2]) * scale,
   ];
   return (views ?? []).slice(0, MAX_VIEWS).map(({ name, position_um, target_um, fov_deg }) => {
-    const [eye, target] = [inRoom(position_um), inRoom(target_um)];
+    const [eye, target] = [toScene(position_um), toScene(target_um)];
     const nearer = halfTan(fov_deg) / halfTan(FIELD_OF_VIEW_DEG);
     const along = (i: 0 | 1 | 2) => target[i] + nearer * (eye[i] - target[i]);
     return { name, target, position: [along(0), along(1), along(2)] };

@@ -90,7 +90,7 @@ describe("the two-dimensional transfer functions of a bundle", () => {
     const many = loader({ soft: Array.from({ length: 33 }, () => SHAPE) });
     many.want("c0");
     await loaded(many);
-    expect(String(faults.at(-1))).toContain("expected at most 32 shapes, found 33");
+    expect(String(faults.at(-1))).toContain("found 33 shapes, expected at most 32");
     expect(learned).toEqual([]);
   });
 });

@@ -22,7 +22,7 @@ export class RovingTabindex {
   }
 
   /** @param start index of the first button that Tab reaches */
-  follow(buttons: readonly HTMLElement[], columns: number, start = 0): void {
+  setButtons(buttons: readonly HTMLElement[], columns: number, start = 0): void {
     this.buttons = buttons;
     this.columns = columns;
     this.stopAt(Math.max(0, start));

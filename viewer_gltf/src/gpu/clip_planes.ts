@@ -33,7 +33,7 @@ export class Cuts {
     corner: noCorner(),
   };
 
-  follow({ box, plane, corner }: Clip, specimen: Matrix4): void {
+  sync({ box, plane, corner }: Clip, specimen: Matrix4): void {
     let count = 0;
     const put = (i: number, normal: Vec3, offset_um: number) =>
       setPlane(this.uCuts.value[i], normal, offset_um, specimen);

@@ -62,7 +62,7 @@ export class Overlay {
   readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
   readonly uniforms: MarchedUniforms;
   private readonly rays = {
-    uToRoom: { value: [new Matrix4(), new Matrix4()] },
+    uToScene: { value: [new Matrix4(), new Matrix4()] },
     uEyeAt: { value: [new Vector3(), new Vector3()] },
   };
 
@@ -103,13 +103,13 @@ export class Overlay {
   /** Shows the image drawn for these eyes, with `scale` pixels per pixel of the frame. */
   show(eyes: Eyes, scale: number): void {
     const { uEyes, uParts, uEyeCount } = this.uniforms;
-    const { uToRoom, uEyeAt } = this.rays;
+    const { uToScene, uEyeAt } = this.rays;
     uEyeCount.value = eyes.all.length;
     eyes.all.slice(0, 2).forEach((eye, i) => {
       const { matrixWorld, projectionMatrixInverse } = eye.camera;
       uEyes.value[i].copy(eye.viewport);
       partOf(eye, scale, uParts.value[i]);
-      uToRoom.value[i].multiplyMatrices(matrixWorld, projectionMatrixInverse);
+      uToScene.value[i].multiplyMatrices(matrixWorld, projectionMatrixInverse);
       uEyeAt.value[i].setFromMatrixPosition(matrixWorld);
     });
     this.mesh.visible = true;

@@ -37,10 +37,10 @@ export class Eyes {
    */
   followHeadset(renderer: WebGLRenderer, camera: PerspectiveCamera): void {
     renderer.xr.updateCamera(camera);
-    this.follow(renderer.xr.getCamera().cameras.map((each) => [each, each.viewport]));
+    this.sync(renderer.xr.getCamera().cameras.map((each) => [each, each.viewport]));
   }
 
-  follow(eyes: readonly (readonly [PerspectiveCamera, Vector4 | undefined])[]): void {
+  sync(eyes: readonly (readonly [PerspectiveCamera, Vector4 | undefined])[]): void {
     this.count = 0;
     this.width_px = 1;
     this.height_px = 1;

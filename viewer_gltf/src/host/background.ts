@@ -1,6 +1,6 @@
 /** The background of the flat view. The specimen has the same colours in front of every background. */
 import type { Backdrop } from "../render/backdrop";
-import type { Room } from "../render/scene";
+import type { SpecimenScene } from "../render/specimen_scene";
 import type { Theme } from "../render/theme";
 
 export class Background {
@@ -8,7 +8,7 @@ export class Background {
   settled: Promise<void> = Promise.resolve();
 
   constructor(
-    private readonly room: Room,
+    private readonly specimenScene: SpecimenScene,
     private readonly onChange: () => void,
   ) {}
 
@@ -18,7 +18,7 @@ export class Background {
    */
   setTheme(theme: Theme, isPlain: boolean): void {
     const use = (backdrop: Backdrop | null) => {
-      this.room.setTheme(theme, backdrop);
+      this.specimenScene.setTheme(theme, backdrop);
       this.onChange();
     };
     use(null);

@@ -4,12 +4,12 @@ import type { Navigation } from "../interaction/orbit_camera";
 import { StageSize } from "../render/canvas_size";
 import { pixelShare } from "../render/pixel_share";
 
-/** Largest number of device pixels per CSS pixel. A third one on a phone costs more than it shows. */
+/** Largest number of device pixels per CSS pixel. Phones have up to 3, but that takes twice the time of 2 and looks alike. */
 const MAX_PIXEL_RATIO = 2;
 
 export function makeRenderer(stage: HTMLElement): WebGLRenderer {
   const renderer = new WebGLRenderer({
-    antialias: false, // the frame has a multisampled target of its own
+    antialias: false, // frames are anti-aliased in a render target of their own
     depth: false,
     powerPreference: "high-performance",
   });

@@ -27,7 +27,7 @@ export class Commands {
   run(command: Command, isOnPage: boolean): boolean {
     const { host, parts } = this.options;
     const { state, viewpoint } = host;
-    const before = host.isInRoom ? null : viewpoint.cameraPose;
+    const before = host.isInStereo ? null : viewpoint.cameraPose;
     if (parts.run(command, isOnPage)) return true;
     if (CAMERA_COMMANDS.has(command)) host.undo.noteCameraMove();
     if (!this.runOwn(command)) {
@@ -46,7 +46,7 @@ export class Commands {
     if (own !== undefined) return own() !== false;
     const { host } = this.options;
     const { navigation } = host.viewpoint;
-    return host.isInRoom ? host.stereo.run(command, host.state) : navigation.run(command);
+    return host.isInStereo ? host.stereo.run(command, host.state) : navigation.run(command);
   }
 
   /** The host's own commands. */
@@ -66,7 +66,7 @@ export class Commands {
     retry: () => this.options.retry(),
     press: () => {
       const { host, taps } = this.options;
-      if (host.isInRoom) return host.stereo.run("press", host.state);
+      if (host.isInStereo) return host.stereo.run("press", host.state);
       if (!taps.tap(host.viewpoint.rayAhead, "key")) host.announce(NOTHING_AHEAD);
       return true;
     },

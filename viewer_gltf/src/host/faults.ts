@@ -46,7 +46,7 @@ export class Faults {
   noteWaiting(files: number): void {
     const { state, dispatch, isIncomplete } = this.options;
     const text = navigator.onLine ? WAITING : OFFLINE;
-    // a file that failed for good keeps its notice until it arrives
+    // a notice about files whose attempts have ended stays until a retry loads them
     const passing = [WAITING, OFFLINE].filter((each) => !state().retryable.includes(each));
     if (files === 0) dispatch({ type: "dismiss", texts: passing });
     else if (state().notices.includes(text)) return;

@@ -75,5 +75,5 @@ export interface Form {
   /** Fetches the files that the view needs, and drops those that it does not need. */
   stream?(view: StreamView): void;
   /** Called before each frame, after the volumes have faded. */
-  dress?(): void;
+  updateMaterials?(): void;
 }

@@ -149,8 +149,8 @@ export class Forms {
   }
 
   /** Called before each frame. */
-  dress(): void {
-    for (const form of this.all) form.dress?.();
+  updateMaterials(): void {
+    for (const form of this.all) form.updateMaterials?.();
   }
 
   /** Streams files for a view, down to an error on screen. */
@@ -159,7 +159,7 @@ export class Forms {
   }
 }
 
-/** Largest distance that additions widen the view beside the specimen, in its longest edges. */
+/** Largest widening of the view for additions on each side, as a multiple of the specimen's longest edge. */
 const WIDEST = 0.5;
 
 /** Returns the corners of the box around the additions of a layer (um, world), limited to WIDEST. */

@@ -12,11 +12,11 @@ import { Pulse } from "./pulse";
 import { SceneFrame, type SceneFrameOptions } from "./scene_frame";
 import { Studio } from "./studio";
 
-/** Largest time step of a frame, s. A page that slept has shown nothing meanwhile. */
+/** Largest time step of a frame, s. After a pause, such as a hidden tab, motions go on from where they stopped. */
 const LONGEST_FRAME_S = 0.1;
 /**
- * Largest time step of fades and notices, s, after a drawn frame that took as long. They end in
- * time even on a slow device.
+ * Largest time step of fades and notices, s, if a frame really took that long to draw. Fades and
+ * notices then end on time on a slow device, too.
  */
 const LONGEST_FADE_S = 1;
 /**
@@ -48,9 +48,9 @@ export class FrameLoop {
   private isStale = true;
   /** Whether something has been loaded since the last frame, which an unchanged view has to show. */
   private hasNews = false;
-  /** Whether the previous frame was part of a motion, and was drawn in its budget. */
+  /** Whether the previous frame was part of a motion, so that it was drawn within a budget. */
   private wasMoving = false;
-  /** Whether the last turn of the loop drew a frame. */
+  /** Whether the last pass of the loop drew a frame. */
   private hasDrawn = false;
   private waiting: (() => void)[] = [];
   private drawn: (() => void)[] = [];
@@ -168,7 +168,7 @@ export class FrameLoop {
     if (isWanted || gathers) {
       this.isStale = isChanging;
       this.hasNews = isFading;
-      forms.dress();
+      forms.updateMaterials();
       const { passes } = this.gathering;
       // late frames first lose their smooth edges
       const isSmooth = !isMoving || settings.steps >= MAX_STEPS;
@@ -198,16 +198,16 @@ export class FrameLoop {
     const fade_s = Math.min(this.hasDrawn ? LONGEST_FADE_S : LONGEST_FRAME_S, passed_s);
     this.hasDrawn = false;
     if (forms.hasJustBegun()) onOverview();
-    const inRoom = stereo.pose(picture.eyes);
+    const stereoCamera = stereo.pose(picture.eyes);
     picture.isSeeThrough = stereo.isInUsersRoom;
-    const camera = inRoom ?? this.scene.poseMono(passed_s);
-    if (inRoom !== null) {
+    const camera = stereoCamera ?? this.scene.poseMono(passed_s);
+    if (stereoCamera !== null) {
       stereo.update(dt_s, viewpoint.head, this.options.shown().state, fade_s);
     }
     const { isChanging, isFading } = this.scene.advance(dt_s, fade_s);
     if (isChanging) this.isStale = true;
     if (isFading) this.hasNews = true;
-    return { camera, isStereo: inRoom !== null, isChanging, isFading };
+    return { camera, isStereo: stereoCamera !== null, isChanging, isFading };
   }
 
   /** Begins a frame within its budget. */

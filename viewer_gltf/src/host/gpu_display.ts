@@ -6,7 +6,7 @@ import { shownBox } from "../math/pick";
 import { Reading } from "../probe/probe_reader";
 import type { FrameRenderer } from "../render/frame_renderer";
 import { GazeFocus } from "../render/gaze_focus";
-import { Room } from "../render/scene";
+import { SpecimenScene } from "../render/specimen_scene";
 import type { Action } from "../state/actions";
 import { setTo } from "../state/parameters/kinds";
 import { SCREEN_STEREO } from "../state/parameters/tools";
@@ -34,7 +34,7 @@ export type DisplayOptions = Readonly<{
   report: (error: unknown) => void;
   stereo: Pick<StereoOptions, "buildPanel" | "onCommand" | "onLenses" | "onChoose">;
   /** Updates the display and the parts to the state again. */
-  follow: () => void;
+  sync: () => void;
   /** Called when stereo has begun or ended. */
   onStereo: () => void;
   /** Called after every frame. */
@@ -50,7 +50,7 @@ export class GpuDisplay implements Display {
   readonly viewpoint: Viewpoint;
   readonly stereo: Stereo;
   readonly background: Background;
-  private readonly room: Room;
+  private readonly specimenScene: SpecimenScene;
   private readonly hybrid: GazeFocus;
   private readonly loop: FrameLoop;
   private readonly canvas: CanvasFit;
@@ -62,11 +62,11 @@ export class GpuDisplay implements Display {
     const { manifest } = bundle;
     const { bounds_um: bounds } = manifest.specimen;
     this.renderer = renderer;
-    this.room = new Room(manifest);
+    this.specimenScene = new SpecimenScene(manifest);
     this.hybrid = new GazeFocus(manifest);
     const onChange = () => this.redraw();
     this.viewpoint = new Viewpoint({
-      ...{ canvas: renderer.domElement, bounds, specimen: this.room.specimen, onChange },
+      ...{ canvas: renderer.domElement, bounds, specimen: this.specimenScene.specimen, onChange },
       stereo: () => this.stereo,
     });
     this.loop = this.makeLoop();
@@ -74,15 +74,15 @@ export class GpuDisplay implements Display {
     this.values = bundle.values === undefined ? null : new ValuesHost(bundle.values);
     this.reading = this.makeReading();
     this.stereo = this.makeStereo();
-    this.background = new Background(this.room, onChange);
+    this.background = new Background(this.specimenScene, onChange);
     this.canvas = new CanvasFit(renderer, stage, this.viewpoint.navigation, onChange);
   }
 
   /** Starts to draw, after all parts have been made. */
   start(): void {
-    const { parts, follow } = this.options;
-    for (const group of parts.groups) this.room.specimen.group.add(group);
-    follow();
+    const { parts, sync } = this.options;
+    for (const group of parts.groups) this.specimenScene.specimen.group.add(group);
+    sync();
     this.loop.start();
   }
 
@@ -95,10 +95,10 @@ export class GpuDisplay implements Display {
       cssPixelsPerInch: this.perInch,
     });
     const { manifest } = this.options.bundle;
-    this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
+    this.specimenScene.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.followScreenStereo(state);
     this.reading.state = state;
-    this.room.mark(isolated === null ? selected : null);
+    this.specimenScene.mark(isolated === null ? selected : null);
     this.loop.setLevel(quality);
     this.redraw();
   }
@@ -153,12 +153,12 @@ export class GpuDisplay implements Display {
 
   /** The scene object that contains the specimen; its matrix maps um to metres of the scene. */
   get specimen(): Object3D {
-    return this.room.specimen.group;
+    return this.specimenScene.specimen.group;
   }
 
   setScreen(perInch: number | null): void {
     this.perInch = perInch;
-    this.options.follow();
+    this.options.sync();
   }
 
   get cssPixelsPerInch(): number | null {
@@ -171,7 +171,7 @@ export class GpuDisplay implements Display {
 
   limitEdge(edge: number): void {
     this.forms.limitEdge(edge);
-    this.options.follow();
+    this.options.sync();
   }
 
   get isLoading(): boolean {
@@ -180,10 +180,10 @@ export class GpuDisplay implements Display {
 
   snapshot(): Snapshot {
     const { parts, state } = this.options;
-    const { renderer, room, hybrid, forms, stereo, viewpoint, loop } = this;
+    const { renderer, specimenScene, hybrid, forms, stereo, viewpoint, loop } = this;
     const measuredValues = parts.service("measured")?.values ?? [];
     const { isLoading } = this;
-    const drawn = { renderer, room, hybrid, forms, stereo, viewpoint, loop };
+    const drawn = { renderer, specimenScene, hybrid, forms, stereo, viewpoint, loop };
     return snapshotOf({ ...drawn, state: state(), isLoading, measuredValues });
   }
 
@@ -197,21 +197,21 @@ export class GpuDisplay implements Display {
   renew(): void {
     this.forms.forget(); // textures that were made since the loss
     this.loop.renew();
-    this.options.follow();
+    this.options.sync();
   }
 
   private makeLoop(): FrameLoop {
-    const { bundle, renderer, stage, parts, state, follow, onFrame } = this.options;
+    const { bundle, renderer, stage, parts, state, sync, onFrame } = this.options;
     return new FrameLoop({
-      ...{ renderer, stage, onFrame, room: this.room, hybrid: this.hybrid },
+      ...{ renderer, stage, onFrame, specimenScene: this.specimenScene, hybrid: this.hybrid },
       bounds: bundle.manifest.specimen.bounds_um,
       shown: () => {
         const { forms, stereo, viewpoint } = this;
         return { forms, parts, stereo, viewpoint, state: state() };
       },
       onAdvance: (frame) => this.advance(frame),
-      onFocus: follow,
-      onOverview: follow,
+      onFocus: sync,
+      onOverview: sync,
     });
   }
 
@@ -246,8 +246,8 @@ export class GpuDisplay implements Display {
     const { bundle, renderer, parts, state, dispatch, onStereo } = this.options;
     return new Stereo(renderer, {
       ...this.options.stereo,
-      scene: this.room.scene,
-      specimen: this.room.specimen,
+      scene: this.specimenScene.scene,
+      specimen: this.specimenScene.specimen,
       tiles: bundle.manifest.tiles,
       handles: () => parts.targets,
       onAction: dispatch,

@@ -93,7 +93,7 @@ export class Host implements PartHost {
     this.undo = new Undo({
       ...{ viewpoint: this.display.viewpoint, signal },
       state: () => this.state,
-      isInRoom: () => this.isInRoom,
+      isInStereo: () => this.isInStereo,
       restore: (state) => this.dispatch({ type: "restore", state }),
       announce: (text) => this.announce(text),
       onChange: () => this.changed.emit(this.state),
@@ -138,7 +138,7 @@ export class Host implements PartHost {
     if (growth !== 1) stereo.resize(growth, next);
     if (notice !== null) stereo.announce(notice);
     if (announcement !== null) this.announce(announcement);
-    this.follow(previous);
+    this.sync(previous);
     this.changed.emit(this.state);
   }
 
@@ -159,7 +159,7 @@ export class Host implements PartHost {
     return this.parts.hasStandingPart;
   }
 
-  get isInRoom(): boolean {
+  get isInStereo(): boolean {
     return this.stereo.kind !== null;
   }
 
@@ -236,7 +236,7 @@ export class Host implements PartHost {
       state: () => this.state,
       dispatch: (action, isStep) => this.dispatch(action, isStep),
       report: (error) => this.report(error),
-      follow: () => this.follow(),
+      sync: () => this.sync(),
       stereo: {
         buildPanel: (view) => this.panel.buildPanel(view),
         onCommand: (command) => this.run(command, false),
@@ -249,7 +249,7 @@ export class Host implements PartHost {
   }
 
   /** Updates the display and the parts to the state. */
-  private follow(previous = this.state): void {
+  private sync(previous = this.state): void {
     this.display.sync(this.state);
     this.parts.sync(this.state, previous);
   }
@@ -258,7 +258,7 @@ export class Host implements PartHost {
   private retry(): void {
     this.dispatch({ type: "dismiss", texts: this.state.retryable });
     this.parts.retryFailed();
-    this.follow();
+    this.sync();
   }
 
   dispose(): void {

@@ -38,7 +38,7 @@ export type PanelSource = Readonly<{
   sections: (view: PanelView) => readonly PartSection[];
 }>;
 
-/** Returns whether a change gives cards to the channels that are shown afterwards. */
+/** Returns whether a change replaces the channels that have a card by those that are shown. */
 const renewsCards = (change: PanelChange) =>
   change.panel === "find" || (change.panel === "unfold" && change.section === "channels");
 
@@ -87,7 +87,7 @@ export class PanelModel {
   }
 
   /** Adds facts about the page and the browser. */
-  learn(facts: Partial<PageFacts>): void {
+  addFacts(facts: Partial<PageFacts>): void {
     this.page = { ...this.page, ...facts };
     this.changed.emit();
   }

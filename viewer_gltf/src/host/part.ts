@@ -3,7 +3,7 @@ import type { Matrix4, Object3D, PerspectiveCamera, Vector2, Vector3, WebGLRende
 import type { Bundle } from "../bundle/load";
 import type { ValuesHost } from "../bundle/values_host";
 import type { Target } from "../interaction/ray_pointer";
-import type { Sight } from "../marks/style";
+import type { EyeView } from "../marks/style";
 import type { ClipPlane } from "../math/clip";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { Lenses, PanelView, PartSection } from "../panel/controls";
@@ -56,7 +56,7 @@ export type FrameView = Readonly<{
   /** Whether the bar of stereo is below the specimen. */
   isBarBelow: boolean;
   /** The eye in the space of the specimen. */
-  sight: Sight;
+  eyeView: EyeView;
   dt_s: number;
 }>;
 
@@ -66,7 +66,7 @@ export type PartScene = Readonly<{
   group: Object3D;
   /** Objects that are not in the depth pass. */
   overlays: readonly Object3D[];
-  /** A number that changes with what the part hides; 0: nothing. */
+  /** A number that changes when the part's opaque objects change; 0: it has none. */
   solid: number;
   /** Whether the objects are visible even if no channel is shown. */
   isStanding: boolean;
@@ -88,10 +88,10 @@ export type Tap = Readonly<{
 }>;
 
 /**
- * "used": nothing else happens; "met": the part has done something, and a tile may still be
+ * "used": nothing else happens; "shared": the part has done something, and a tile may still be
  * selected; null: no hit.
  */
-export type TapAnswer = "used" | "met" | null;
+export type TapAnswer = "used" | "shared" | null;
 
 /** Functions by the name of the command. A function that returns false leaves the command to others. */
 export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;
@@ -137,7 +137,7 @@ export interface Part {
   /** Returns the nearest hit of a ray (um); null: none. */
   pick?(ray: Ray): Hit | null;
   /** Called for every choice in the view, before it has an effect. */
-  hearTap?(tap: Tap): void;
+  onTap?(tap: Tap): void;
   tap?(tap: Tap): TapAnswer;
   /** Called for a choice on the flat screen that no part has used. */
   openCard?(tap: Tap): void;
@@ -240,7 +240,7 @@ export interface PartHost {
   /** The user has chosen another lens profile in stereo. */
   readonly lensesChosen: Signal<Lenses>;
   /** Whether the user is in stereo, where the page is not visible. */
-  readonly isInRoom: boolean;
+  readonly isInStereo: boolean;
   /** @param isStep whether the action is a step that undo takes back */
   dispatch(action: Action, isStep?: boolean): void;
   /** Runs a command. Returns whether that was possible. */

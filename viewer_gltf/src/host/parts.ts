@@ -123,13 +123,13 @@ export class Parts {
     return hits.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
   }
 
-  hearTap(tap: Tap): void {
-    for (const part of this.all) part.hearTap?.(tap);
+  onTap(tap: Tap): void {
+    for (const part of this.all) part.onTap?.(tap);
   }
 
   /** Passes a tap to the parts until one has used it. */
-  tap(tap: Tap): "used" | "met" | null {
-    let answer: "met" | null = null;
+  tap(tap: Tap): "used" | "shared" | null {
+    let answer: "shared" | null = null;
     for (const part of this.all) {
       const ofPart = part.tap?.(tap) ?? null;
       if (ofPart === "used") return "used";

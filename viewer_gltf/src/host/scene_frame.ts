@@ -2,11 +2,11 @@
 import { type Camera, type Matrix4, Vector3, type WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import { rayAhead } from "../interaction/rays";
-import { sightOf } from "../marks/sight";
+import { eyeViewOf } from "../marks/eye_view";
 import type { Vec3 } from "../math/vec3";
 import { type FramePace, FrameRenderer } from "../render/frame_renderer";
 import type { GazeFocus } from "../render/gaze_focus";
-import type { Room } from "../render/scene";
+import type { SpecimenScene } from "../render/specimen_scene";
 import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import type { Stereo } from "../xr/stereo";
@@ -18,7 +18,7 @@ import type { Viewpoint } from "./viewpoint";
 export type SceneFrameOptions = Readonly<{
   renderer: WebGLRenderer;
   stage: HTMLElement;
-  room: Room;
+  specimenScene: SpecimenScene;
   hybrid: GazeFocus;
   /** Box of the specimen, um. */
   bounds: Bounds;
@@ -41,8 +41,8 @@ export class SceneFrame {
   private readonly eye = new Vector3();
 
   constructor(private readonly options: SceneFrameOptions) {
-    const { renderer, room, hybrid } = options;
-    this.picture = new FrameRenderer(renderer, room, hybrid);
+    const { renderer, specimenScene, hybrid } = options;
+    this.picture = new FrameRenderer(renderer, specimenScene, hybrid);
   }
 
   /** Poses the flat camera, and returns it. */
@@ -52,7 +52,7 @@ export class SceneFrame {
     const outline = forms.outline(state);
     if (outline !== null) navigation.setOccupied(outline);
     const shown = forms.shownPoints(state);
-    if (shown !== null) this.options.room.fitBackdrop(navigation.inRoom(shown));
+    if (shown !== null) this.options.specimenScene.fitBackdrop(navigation.toScene(shown));
     navigation.update(dt_s);
     this.followScreen();
     return navigation.camera;
@@ -67,10 +67,10 @@ export class SceneFrame {
 
   /** Follows the gaze, and advances motions and fades. Returns whether each goes on. */
   advance(dt_s: number, fade_s = dt_s): Readonly<{ isChanging: boolean; isFading: boolean }> {
-    const { hybrid, room, onFocus } = this.options;
+    const { hybrid, specimenScene, onFocus } = this.options;
     const { forms, stereo, viewpoint, state } = this.options.shown();
     const { head } = viewpoint;
-    const { specimen } = room;
+    const { specimen } = specimenScene;
     const isMoving = specimen.advance(dt_s);
     this.picture.fade.advance(fade_s);
     if (specimen.takeJump() && stereo.kind !== null) this.picture.fade.begin();
@@ -82,9 +82,9 @@ export class SceneFrame {
   }
 
   private viewOf(head: Matrix4, dt_s: number): FrameView {
-    const { hybrid, room, stage } = this.options;
+    const { hybrid, specimenScene, stage } = this.options;
     const { stereo, viewpoint } = this.options.shown();
-    const { group } = room.specimen;
+    const { group } = specimenScene.specimen;
     const { camera, controls } = viewpoint.navigation;
     const flat = { camera, height_px: stage.clientHeight, focus: controls.target };
     const screen = stereo.kind === null ? flat : null;
@@ -96,7 +96,7 @@ export class SceneFrame {
       disc: { apex_um: hybrid.apex_um, axis_um: hybrid.axis_um, cosine: hybrid.cosines[1] },
       isPanelOpen: stereo.isPanelOpen,
       isBarBelow: !stereo.isInUsersRoom,
-      sight: sightOf(head, group.matrixWorld, screen),
+      eyeView: eyeViewOf(head, group.matrixWorld, screen),
       dt_s,
     };
   }
@@ -118,13 +118,13 @@ export class SceneFrame {
   }
 
   private openTile(state: ViewerState): Bounds | null {
-    const { room, hybrid } = this.options;
-    return room.boundsOf(marchedTile(state, hybrid.focusTiles));
+    const { specimenScene, hybrid } = this.options;
+    return specimenScene.boundsOf(marchedTile(state, hybrid.focusTiles));
   }
 
   /** Returns the place of the eye, um, world. */
   private eyeOnSpecimen(head: Matrix4): Vec3 {
-    const { group } = this.options.room.specimen;
+    const { group } = this.options.specimenScene.specimen;
     return group.worldToLocal(this.eye.setFromMatrixPosition(head)).toArray();
   }
 

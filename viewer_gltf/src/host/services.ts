@@ -19,8 +19,8 @@ import type { VolumeLimits } from "../voxels/mip_levels";
 import type { VolumeSource } from "../voxels/volume_source";
 
 /**
- * `column` is the name of the column that colours. A row has one colour, the colours of a palette
- * from end to end, or none for a text alone.
+ * A legend of colours. `column` is the name of the table column that sets the colours. A row has
+ * one colour, the colours of a palette from end to end, or none for a text alone.
  */
 export type ColorLegend = Readonly<{
   column: string;
@@ -44,7 +44,7 @@ export interface ObjectMaps {
   /** Rows of the shown objects, by channel. */
   readonly rowsShown: ReadonlyMap<string, readonly number[]>;
   /** Returns the number of a channel's objects that are shown; null: their table is not loaded yet. */
-  left(channel: string): number | null;
+  shownCount(channel: string): number | null;
 }
 
 /** Images of the view. */
@@ -75,7 +75,7 @@ export interface PagePanel {
   /** Focuses a control, also in a hidden panel. Returns whether it exists. */
   focus(section: string, control: string): boolean;
   /** Shows an announcement only on the page. */
-  say(words: string): void;
+  showAnnouncement(words: string): void;
   /** Adds a button to the last announcement. */
   offer(words: string, label: string, act: () => void): void;
 }

@@ -3,7 +3,7 @@ import type { WebGLRenderer } from "three";
 import type { CameraPose } from "../interaction/named_views";
 import type { VolumeStatus } from "../render/drawn_forms";
 import type { GazeFocus } from "../render/gaze_focus";
-import type { Room } from "../render/scene";
+import type { SpecimenScene } from "../render/specimen_scene";
 import { discLimit } from "../state/focus_tiles";
 import type { Progress } from "../state/overview_progress";
 import type { QualitySettings } from "../state/quality_controller";
@@ -51,7 +51,7 @@ export type Snapshot = Readonly<{
   /** Rotation of the specimen in the scene, a quaternion. */
   specimenTurn: readonly [number, number, number, number];
   /** Notices that are visible in stereo now. */
-  told: readonly string[];
+  stereoNotices: readonly string[];
   /** Controls of the panel in the scene now, its button first; none on a flat screen. */
   menu: readonly MenuEntry[];
 }>;
@@ -59,7 +59,7 @@ export type Snapshot = Readonly<{
 export type SnapshotSource = Readonly<{
   state: ViewerState;
   renderer: WebGLRenderer;
-  room: Room;
+  specimenScene: SpecimenScene;
   hybrid: GazeFocus;
   forms: Forms;
   stereo: Stereo;
@@ -70,7 +70,7 @@ export type SnapshotSource = Readonly<{
 }>;
 
 export function snapshotOf(source: SnapshotSource): Snapshot {
-  const { state, renderer, room, hybrid, forms, stereo, viewpoint, loop } = source;
+  const { state, renderer, specimenScene, hybrid, forms, stereo, viewpoint, loop } = source;
   const { marched, traced } = forms;
   const { memory, render, programs } = renderer.info;
   return {
@@ -92,9 +92,9 @@ export function snapshotOf(source: SnapshotSource): Snapshot {
     measuredValues: source.measuredValues,
     gpuObjects: { ...memory, programs: programs?.length ?? 0 },
     isStereo: stereo.kind !== null,
-    specimenAt: room.specimen.middle,
-    specimenTurn: room.specimen.pose.orientation.toArray(),
-    told: stereo.notices,
+    specimenAt: specimenScene.specimen.middle,
+    specimenTurn: specimenScene.specimen.pose.orientation.toArray(),
+    stereoNotices: stereo.notices,
     menu: stereo.menu,
   };
 }

@@ -11,7 +11,7 @@ export type Moment = Readonly<{
   /** null: the opening camera. */
   camera: CameraView | null;
   /** Whether the user was in stereo. The camera has no meaning there, because the head looks. */
-  isInRoom: boolean;
+  isInStereo: boolean;
 }>;
 
 /** Name of a step that moves the camera. */
@@ -42,8 +42,8 @@ export class Steps {
   }
 
   get undoes(): string | null {
-    const { camera, isInRoom } = this.now();
-    if (!isInRoom && !isSame(camera, this.seenFrom)) return CAMERA_STEP;
+    const { camera, isInStereo } = this.now();
+    if (!isInStereo && !isSame(camera, this.seenFrom)) return CAMERA_STEP;
     return this.history.past.at(-1)?.name ?? null;
   }
 
@@ -54,7 +54,7 @@ export class Steps {
   /** Makes a step of a move of the camera since the last step, if there was one. */
   note(): void {
     const moment = this.now();
-    if (moment.isInRoom || isSame(moment.camera, this.seenFrom)) return;
+    if (moment.isInStereo || isSame(moment.camera, this.seenFrom)) return;
     this.push({ ...moment, camera: this.seenFrom }, CAMERA_STEP, null);
     this.seenFrom = moment.camera;
   }
@@ -101,7 +101,7 @@ export class Steps {
   private take(found: ReturnType<typeof undone<Moment>>) {
     if (found === null) return null;
     this.history = found.history;
-    if (!found.moment.isInRoom) this.seenFrom = found.moment.camera;
+    if (!found.moment.isInStereo) this.seenFrom = found.moment.camera;
     return found;
   }
 }

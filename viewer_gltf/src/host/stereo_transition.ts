@@ -6,14 +6,14 @@ import { Euler, Quaternion, Vector3 } from "three";
 import type { Navigation } from "../interaction/orbit_camera";
 import { type HandPose, type SpecimenPose, zoomAbout } from "../math/grab";
 import { ROOM_SIZE, XR_DISTANCE_M } from "../render/placement";
-import { intoRoom, ontoScreen } from "../render/screen_to_room";
+import { intoStereo, ontoScreen } from "../render/screen_to_stereo";
 import type { Specimen } from "../render/specimen_pose";
 import type { CameraView } from "../state/camera_view";
 
 export class StereoTransition {
   /** Poses of the specimen in the scene and on the screen at the start of stereo; null: no stereo. */
   private entered: Readonly<{
-    inRoom: SpecimenPose;
+    inStereo: SpecimenPose;
     onScreen: SpecimenPose | null;
     hold: HandPose;
     facing: Quaternion;
@@ -40,12 +40,12 @@ export class StereoTransition {
     const size = table === null ? 1 : ROOM_SIZE;
     const onScreen = this.poseOnScreen;
     const hold = table === null ? this.screenHold : levelled(this.screenHold);
-    const pose = intoRoom(specimen.pose, hold, ahead_m, facing);
+    const pose = intoStereo(specimen.pose, hold, ahead_m, facing);
     specimen.anchorAt(ahead_m, size, facing);
     const sized = zoomAbout(pose, ahead_m, onScreen === null ? size * larger : size);
     const isOther = !navigation.isStraight || onScreen !== null || larger !== 1 || table !== null;
     if (isOther) specimen.moveTo(sized, new Vector3());
-    this.entered = { inRoom: specimen.pose, onScreen, hold, facing };
+    this.entered = { inStereo: specimen.pose, onScreen, hold, facing };
   }
 
   /** Keeps the middle of the view when stereo ends. */
@@ -97,7 +97,7 @@ export class StereoTransition {
     const { anchor, home, isMoved, pose } = this.specimen;
     if (entered === null) return isMoved ? pose : null;
     // the user has not moved the specimen in stereo
-    if (pose === entered.inRoom) return entered.onScreen;
+    if (pose === entered.inStereo) return entered.onScreen;
     if (!isMoved && navigation.isStraight) return null;
     const there = zoomAbout(isMoved ? pose : home, anchor, 1 / this.specimen.size);
     return ontoScreen(there, entered.hold, anchor, entered.facing);

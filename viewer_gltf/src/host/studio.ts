@@ -38,10 +38,10 @@ export class Studio implements StillMaker {
   /** Moves the flat camera, and waits until its view is loaded, for at most `most_ms`. */
   async arrive(dt_s: number, most_ms: number): Promise<void> {
     const start_ms = performance.now();
-    this.follow(dt_s);
+    this.sync(dt_s);
     while (this.isLoading && performance.now() - start_ms < most_ms) {
       await new Promise((resolve) => setTimeout(resolve, POLL_MS));
-      this.follow(0);
+      this.sync(0);
     }
   }
 
@@ -50,7 +50,7 @@ export class Studio implements StillMaker {
   }
 
   /** Moves the flat camera, and streams its view without drawing. */
-  private follow(dt_s: number): void {
+  private sync(dt_s: number): void {
     const { scene, renderer, shown, onOverview } = this.options;
     const camera = scene.poseMono(dt_s);
     scene.advance(dt_s);
@@ -72,7 +72,7 @@ export class Studio implements StillMaker {
     const traced = forms.traced?.isShown ? forms.traced : null;
     const gl = renderer.getContext();
     scene.followScreen();
-    forms.dress();
+    forms.updateMaterials();
     const start_ms = performance.now();
     const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
     for (let frames = begun?.frames ?? 0; ; ) {

@@ -19,7 +19,7 @@ export class Taps {
     private readonly parts: Parts,
     private readonly signal: AbortSignal,
   ) {
-    const isFlat = () => !host.isInRoom;
+    const isFlat = () => !host.isInStereo;
     listenForClicks(
       host.canvas,
       (point) => {
@@ -46,7 +46,7 @@ export class Taps {
     const { state, bundle } = this.host;
     const { tiles } = bundle.manifest;
     const tap = { ray, by, time_ms: performance.now() };
-    this.parts.hearTap(tap);
+    this.parts.onTap(tap);
     const answer = this.parts.tap(tap);
     if (answer === "used") return true;
     const tile = pickTile(ray, shownTiles(tiles, state.isolated), state.clip)?.id ?? null;

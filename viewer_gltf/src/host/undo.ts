@@ -20,7 +20,7 @@ export type Mark = Readonly<{
 export type UndoOptions = Readonly<{
   viewpoint: Viewpoint;
   state: () => ViewerState;
-  isInRoom: () => boolean;
+  isInStereo: () => boolean;
   restore: (state: ViewerState) => void;
   announce: (text: string) => void;
   /** Called when the panel has to show what can be undone now. */
@@ -32,9 +32,9 @@ export class Undo {
   private readonly steps: Steps;
 
   constructor(private readonly options: UndoOptions) {
-    const { viewpoint, state, isInRoom, signal } = options;
+    const { viewpoint, state, isInStereo, signal } = options;
     this.steps = new Steps(
-      () => ({ state: state(), camera: viewpoint.cameraView, isInRoom: isInRoom() }),
+      () => ({ state: state(), camera: viewpoint.cameraView, isInStereo: isInStereo() }),
       signal,
     );
     viewpoint.navigation.controls.addEventListener("start", () => this.noteCameraMove());
@@ -61,16 +61,16 @@ export class Undo {
   }
 
   step(command: "undo" | "redo"): void {
-    const { viewpoint, isInRoom, restore, announce, onChange } = this.options;
+    const { viewpoint, isInStereo, restore, announce, onChange } = this.options;
     const found = command === "undo" ? this.steps.undo() : this.steps.redo();
     if (found === null) {
       announce(REFUSED[command]);
       return;
     }
-    const { state, camera, isInRoom: wasInRoom } = found.moment;
+    const { state, camera, isInStereo: wasInStereo } = found.moment;
     restore(state);
     // in stereo the head looks, and the specimen stays where it was placed
-    if (!wasInRoom && !isInRoom()) viewpoint.restore(camera);
+    if (!wasInStereo && !isInStereo()) viewpoint.restore(camera);
     announce(`${command === "undo" ? "Undone" : "Redone"}: ${found.name}.`);
     onChange();
   }
@@ -94,12 +94,12 @@ export class Undo {
 
   /** Returns to the state and the camera of a mark. */
   takeBack({ state, camera, newest }: Mark): void {
-    const { viewpoint, isInRoom, onChange } = this.options;
+    const { viewpoint, isInStereo, onChange } = this.options;
     if (!isSameView(state, this.options.state())) {
       // a change that was joined to the previous step made no step of its own
       for (let left = Math.max(1, this.steps.since(newest)); left > 0; left--) this.step("undo");
     }
-    if (!isInRoom()) viewpoint.restore(camera);
+    if (!isInStereo()) viewpoint.restore(camera);
     onChange();
   }
 

@@ -22,15 +22,16 @@ import { ahead } from "../xr/head_pose";
 import type { Stereo } from "../xr/stereo";
 import { StereoTransition } from "./stereo_transition";
 
-/** Distance of the eye from an object that it flies to, in lengths of the object, and at least in m. */
+/** Distance of the eye from an object that it flies to, as a multiple of the object's length. */
 const NEAREST_OBJECT = 6;
+/** Smallest distance of the eye from an object that it flies to, m. */
 const NEAREST_OBJECT_M = 0.08;
 /** Directions from which to view an object: corners, edges and faces of a cube, from the front first. */
 const VIEW_DIRECTIONS = [1, 0, -1].flatMap((z) =>
   [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
 );
 /** Smallest length of an object that is brought in front of the eyes in stereo, m. */
-const OBJECT_IN_ROOM_M = 0.15;
+const OBJECT_IN_STEREO_M = 0.15;
 
 export type ViewpointOptions = Readonly<{
   canvas: HTMLCanvasElement;
@@ -207,7 +208,7 @@ export class Viewpoint {
     const edge_m = specimen.scale * Math.max(...box.max.map((v, i) => v - box.min[i]));
     this.options.onChange();
     if (this.options.stereo().kind === null) return this.flyOnScreen(middle, edge_m, isSeen);
-    const larger = Math.max(1, OBJECT_IN_ROOM_M / edge_m);
+    const larger = Math.max(1, OBJECT_IN_STEREO_M / edge_m);
     const pose = zoomAbout(specimen.pose, middle, larger);
     pose.position.add(specimen.anchor).sub(middle);
     specimen.jumpTo(pose, new Vector3().setFromMatrixPosition(this.head));

@@ -1,7 +1,7 @@
 /** Asks for confirmation before something is lost. */
 import { element } from "../dom/element";
 
-/** Resolves to whether the person agrees. The focus goes back to where it was. */
+/** Resolves to whether the user agrees. The focus then returns to the element that had it before. */
 export function ask(title: string, words: string, agree: string): Promise<boolean> {
   const no = element("button", { type: "button", textContent: "Keep it", value: "" });
   const yes = element("button", { type: "button", textContent: agree, className: "alarming" });

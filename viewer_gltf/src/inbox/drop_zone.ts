@@ -24,8 +24,8 @@ export class DropZone {
       element("p", {
         className: "hint",
         textContent:
-          "A file, a folder or a zip: DICOM, NIfTI, TIFF, OME-Zarr, CZI and more. All that is dropped at once is one " +
-          "specimen.",
+          "A file, a folder or a zip: DICOM, NIfTI, TIFF, OME-Zarr, CZI and more. Everything that you drop at once is " +
+          "one specimen.",
       }),
       this.choices(),
       this.addressForm(),
@@ -34,7 +34,7 @@ export class DropZone {
   }
 
   /** @param isFault whether the text reports an error */
-  say(text: string, isFault = false): void {
+  showText(text: string, isFault = false): void {
     this.status.classList.toggle("fault", isFault);
     setText(this.status, text);
   }
@@ -112,7 +112,7 @@ export class DropZone {
       event.preventDefault(); // the page's security policy forbids sending forms
       const address = field.value.trim();
       if (address === "") {
-        this.say("Paste the address of an image first.", true);
+        this.showText("Paste the address of an image first.", true);
         field.focus();
       } else if (await this.handIn.address(address)) field.value = "";
     };

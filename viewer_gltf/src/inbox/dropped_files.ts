@@ -1,10 +1,10 @@
-/** The files that a person drops or chooses, with their names in the folder that they come from. */
+/** The files that a user drops or chooses, with their paths in the dropped folder. */
 import type { NamedFile } from "./upload_files";
 
 /** Called with the number of files that were found so far. */
 type OnFound = (count: number) => void;
 
-/** Files that are asked for at a time: each answer takes a moment, and a folder has thousands. */
+/** Largest number of files that are requested at a time; a folder may have thousands, and each answer takes a moment. */
 const AT_A_TIME = 64;
 
 /** Dropped files, and handles by which a later visit reads them again. Some browsers have no handles. */
@@ -15,7 +15,7 @@ export type Dropped = Readonly<{
 
 type WithHandle = Readonly<{ getAsFileSystemHandle?: () => Promise<FileSystemHandle | null> }>;
 
-/** To be called within the event: afterwards its items are gone. */
+/** Returns the dropped files. Must be called within the event, because its items are gone afterwards. */
 export function droppedFiles({ items, files }: DataTransfer): Dropped {
   const ofFiles = [...items].filter(({ kind }) => kind === "file");
   const entries = ofFiles.map((item) => item.webkitGetAsEntry?.() ?? null);
@@ -36,12 +36,12 @@ export function droppedFiles({ items, files }: DataTransfer): Dropped {
   };
 }
 
-/** The files of an input, each of which knows its path in the folder that was chosen. */
+/** Returns the files of an input with their paths in the chosen folder. */
 export function chosenFiles(files: Iterable<File>): readonly NamedFile[] {
   return [...files].map((file) => ({ name: file.webkitRelativePath || file.name, file }));
 }
 
-/** All files of these files and folders. Rejects if one can't be read. */
+/** Returns all files in these files and folders. Rejects if one can't be read. */
 export async function filesOfHandles(
   handles: readonly FileSystemHandle[],
   onFound: OnFound,
@@ -91,7 +91,7 @@ const promised = (entry: FileSystemFileEntry) => ({
 const readSome = (reader: FileSystemDirectoryReader) =>
   new Promise<FileSystemEntry[]>((resolve, reject) => reader.readEntries(resolve, reject));
 
-/** Asks for files, several at a time. */
+/** Requests files, several at a time, and collects them. */
 class Finder {
   private readonly found: NamedFile[] = [];
   private readonly pending = new Set<Promise<void>>();

@@ -20,13 +20,14 @@ const MOVING_MS = 4000;
 type Memory = {
   card: Card;
   understood: Understood | null;
-  /** Raised whenever the item is read again; `asked`: the reading that was last asked for. */
+  /** Number of times that the server has read the item. */
   reading: number;
+  /** The reading whose summary was last requested. */
   asked: number;
   isBusy: boolean;
   fault: string;
   /** The last state that was reported to screen readers. */
-  said: string;
+  announced: string;
   bytes: number;
   /** Time at which bytes last arrived, ms; 0: none have since this page opened. */
   moved_ms: number;
@@ -78,7 +79,7 @@ export class InboxPage {
       this.aloud,
     );
     this.empty.textContent = "Asking the server for its images.";
-    void this.learnHandles();
+    void this.loadHandles();
     addEventListener("offline", () => this.eachUpload((upload) => upload.loseConnection()));
     addEventListener("online", () => this.eachUpload((upload) => upload.retryNow()));
     addEventListener("beforeunload", (event) => {
@@ -94,7 +95,7 @@ export class InboxPage {
     this.render();
   }
 
-  private async learnHandles(): Promise<void> {
+  private async loadHandles(): Promise<void> {
     this.withHandles = new Set(await keptItems());
     this.render();
   }
@@ -108,11 +109,11 @@ export class InboxPage {
   private async take(dropped: Dropped): Promise<void> {
     try {
       const found = await dropped.files((count) =>
-        this.zone.say(`Listing the files: ${count} so far.`),
+        this.zone.showText(`Listing the files: ${count} so far.`),
       );
       await this.begin(found, await dropped.handles);
     } catch (error) {
-      this.zone.say(faultOf(error, "The files can't be read. Drop them again."), true);
+      this.zone.showText(faultOf(error, "The files can't be read. Drop them again."), true);
     }
   }
 
@@ -125,14 +126,14 @@ export class InboxPage {
     const files = new UploadFiles(found);
     const refusal = refusalOf(files.files.length, files.bytes, state.limits);
     if (refusal !== null) {
-      this.zone.say(refusal, true);
+      this.zone.showText(refusal, true);
       return;
     }
     const { id, offset } = await this.server.begin(files);
-    this.zone.say("");
+    this.zone.showText("");
     const known = this.uploads.get(id);
     if (known !== undefined && !known.isOver) {
-      this.zone.say("These files are being uploaded already.");
+      this.zone.showText("These files are being uploaded already.");
       return;
     }
     this.names.set(id, nameOf(files));
@@ -147,18 +148,18 @@ export class InboxPage {
 
   private async endUpload({ id, progress }: Upload): Promise<void> {
     if (progress.doing === "complete") await forgetHandles(id);
-    await this.learnHandles();
+    await this.loadHandles();
   }
 
   /** Sends an address to the server. Returns whether the server has accepted it. */
   private async takeAddress(address: string): Promise<boolean> {
-    this.zone.say("Sending the address to the server.");
+    this.zone.showText("Sending the address to the server.");
     try {
       await this.server.addAddress(address);
-      this.zone.say("");
+      this.zone.showText("");
       return true;
     } catch (error) {
-      this.zone.say(
+      this.zone.showText(
         faultOf(error, "The address could not be sent to the server. Try again."),
         true,
       );
@@ -250,7 +251,14 @@ export class InboxPage {
         act: (item, action, keeps) => void this.act(item, action, keeps),
         choose: (item, choices) => void this.choose(item, choices),
       });
-      const start = { understood: null, reading: 0, asked: -1, isBusy: false, fault: "", said: "" };
+      const start = {
+        understood: null,
+        reading: 0,
+        asked: -1,
+        isBusy: false,
+        fault: "",
+        announced: "",
+      };
       memory = { card, ...start, bytes, moved_ms: 0 };
       this.memories.set(id, memory);
     }
@@ -285,7 +293,7 @@ export class InboxPage {
     if (item.bytes > memory.bytes) memory.moved_ms = performance.now();
     memory.bytes = item.bytes;
     if (item.doing === "understanding") memory.reading = memory.asked + 1;
-    if (isRead(item) && memory.asked < memory.reading) void this.learn(item, memory);
+    if (isRead(item) && memory.asked < memory.reading) void this.loadSummary(item, memory);
     const isMoving = memory.moved_ms > 0 && performance.now() - memory.moved_ms < MOVING_MS;
     const { understood, isBusy, fault, reading } = memory;
     const ownName = this.names.get(item.id) ?? "";
@@ -299,7 +307,7 @@ export class InboxPage {
     memory.card.update({ item, situation, understood, limits, ownName, isBusy, fault, reading });
     const words = wordsOf(item, upload, situation.isMoving, limits);
     const state = stateName(item, upload, situation.isMoving);
-    this.sayAloud(item, memory, state, `${titleOf(item, ownName)}: ${words}`);
+    this.announce(item, memory, state, `${titleOf(item, ownName)}: ${words}`);
     return memory.card.root;
   }
 
@@ -309,7 +317,7 @@ export class InboxPage {
   }
 
   /** Fetches the summary of an item. */
-  private async learn(item: Item, memory: Memory): Promise<void> {
+  private async loadSummary(item: Item, memory: Memory): Promise<void> {
     memory.asked = memory.reading;
     try {
       memory.understood = await this.server.understood(item.id);
@@ -320,10 +328,10 @@ export class InboxPage {
   }
 
   /** Reports a new state to screen readers, but not each step of its progress. */
-  private sayAloud(item: Item, memory: Memory, state: string, words: string): void {
-    if (state === memory.said) return;
-    const isFirst = memory.said === "";
-    memory.said = state;
+  private announce(item: Item, memory: Memory, state: string, words: string): void {
+    if (state === memory.announced) return;
+    const isFirst = memory.announced === "";
+    memory.announced = state;
     if (!isFirst || item.doing === "uploading") setText(this.aloud, words);
   }
 }

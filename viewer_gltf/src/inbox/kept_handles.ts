@@ -1,11 +1,11 @@
 /**
- * Handles of dropped files and folders, kept by the browser: after a reload, an unfinished upload goes on by one click.
- * Some browsers have no handles, or keep nothing: then the same files are dropped again.
+ * Stores handles of dropped files and folders in the browser, so that an unfinished upload continues by one click after
+ * a reload. Some browsers have no handles, or store nothing. Users then have to drop the same files again.
  */
 const DATABASE = "stereocell-inbox";
 const STORE = "handles";
 
-/** Most handles that are kept of one item: the browser asks for the permission to read each of them. */
+/** Largest number of handles that are stored for an item; the browser asks for permission to read each of them. */
 const MOST_HANDLES = 8;
 
 type WithPermission = FileSystemHandle &
@@ -51,14 +51,14 @@ export async function forgetHandles(id: string): Promise<void> {
   await ask("readwrite", (store) => store.delete(id));
 }
 
-/** The items of which handles are kept. */
+/** Returns the IDs of the items that have stored handles. */
 export async function keptItems(): Promise<readonly string[]> {
   return ((await ask("readonly", (store) => store.getAllKeys())) ?? []).map(String);
 }
 
 /**
- * The handles of an item, once the person has allowed this page to read them. Must be called from within a click.
- * Empty: there are none, or the person has refused.
+ * Returns the handles of an item after the user has allowed this page to read them. Must be called from within a click.
+ * Returns an empty list if there are none, or if the user refuses.
  */
 export async function readableHandles(id: string): Promise<readonly FileSystemHandle[]> {
   const found = (await ask<unknown>("readonly", (store) => store.get(id))) ?? [];

@@ -11,13 +11,13 @@ import { Server } from "./server";
 
 const LIGHT = matchMedia("(prefers-color-scheme: light)");
 
-/** The page's colours are those of the system. */
-function dress(): void {
+/** Gives the page the colour theme of the system. */
+function applyTheme(): void {
   document.documentElement.dataset.theme = LIGHT.matches ? "light" : "dark";
 }
 
-dress();
-LIGHT.addEventListener("change", dress);
+applyTheme();
+LIGHT.addEventListener("change", applyTheme);
 
 const app = document.getElementById("app");
 if (app === null) throw new Error("the page has no #app");

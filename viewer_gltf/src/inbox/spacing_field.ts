@@ -15,19 +15,19 @@ const DIGITS = 4;
 const MICROMETRE = { sign: "µm", name: "micrometres", um: 1 };
 const MILLIMETRE = { sign: "mm", name: "millimetres", um: 1000 };
 
-/** Scanners state their spacing in mm. A spacing that is not known is that of a microscope's file. */
+/** Returns the unit of the fields: mm for the spacing of a scanner, um for that of a microscope and if none is known. */
 function unitOf(spacing_um: readonly number[]) {
   return Math.max(0, ...spacing_um) < 100 ? MICROMETRE : MILLIMETRE;
 }
 
-/** A length above 0, with a point or a comma; null: the text is none. */
+/** Reads a length above 0, with a decimal point or comma; null if the text is not a length. */
 export function lengthOf(text: string): number | null {
   const value = Number(text.trim().replace(",", "."));
   return text.trim() !== "" && Number.isFinite(value) && value > 0 ? value : null;
 }
 
 /**
- * @param name tells the fields of one item from those of another
+ * @param name prefix of the fields' IDs, which differs between items
  * @param spacing_um x, y, z; empty: not known
  * @param onChange called once all three have a length
  */

@@ -81,29 +81,29 @@ describe("an upload", () => {
   afterEach(() => void vi.useRealTimers());
 
   function prepare(store: Store, offset = 0, files = filesOf()) {
-    const told: Progress[] = [];
+    const reports: Progress[] = [];
     const server = new Server("http://localhost/", store.request as typeof fetch);
     const upload = new Upload("a1", files, offset, server, PIECE, (progress) =>
-      told.push(progress),
+      reports.push(progress),
     );
-    return { upload, told };
+    return { upload, reports };
   }
 
   async function finish(store: Store, offset = 0) {
-    const { upload, told } = prepare(store, offset);
+    const { upload, reports } = prepare(store, offset);
     const run = upload.run();
     await passUntil(run);
-    return told;
+    return reports;
   }
 
   const patches = (store: Store) => store.requests.filter((each) => each.startsWith("PATCH"));
 
   it("sends all bytes in order, in pieces of at most what the server takes", async () => {
     const store = new Store();
-    const told = await finish(store);
+    const reports = await finish(store);
     expect(store.isWhole).toBe(true);
     expect(patches(store)).toHaveLength(5);
-    expect(told.at(-1)).toMatchObject({ doing: "complete", sent: TOTAL, total: TOTAL });
+    expect(reports.at(-1)).toMatchObject({ doing: "complete", sent: TOTAL, total: TOTAL });
   });
 
   it("begins where the server has got to, as after a reload", async () => {
@@ -116,9 +116,9 @@ describe("an upload", () => {
 
   it("goes on after lost connections from the bytes that have arrived", async () => {
     const store = new Store([null, "cut", "lost", "lost", null, "cut"]);
-    const told = await finish(store);
+    const reports = await finish(store);
     expect(store.isWhole).toBe(true);
-    expect(told.some(({ doing }) => doing === "lost")).toBe(true);
+    expect(reports.some(({ doing }) => doing === "lost")).toBe(true);
     expect(store.requests.filter((each) => each.startsWith("HEAD"))).toHaveLength(4);
   });
 
@@ -130,15 +130,15 @@ describe("an upload", () => {
 
   it("waits while the server is busy or full, and repeats its words", async () => {
     const store = new Store([null, 507, 503]);
-    const told = await finish(store);
+    const reports = await finish(store);
     expect(store.isWhole).toBe(true);
-    expect(told.find(({ doing }) => doing === "lost")?.line).toBe("The disk is full.");
+    expect(reports.find(({ doing }) => doing === "lost")?.line).toBe("The disk is full.");
   });
 
   it.each([403, 404, 413])("ends where the server refuses it for good: %i", async (status) => {
     const store = new Store([null, status]);
-    const told = await finish(store);
-    expect(told.at(-1)).toMatchObject({ doing: "refused", line: "The disk is full." });
+    const reports = await finish(store);
+    expect(reports.at(-1)).toMatchObject({ doing: "refused", line: "The disk is full." });
     expect(store.requests).toHaveLength(2);
   });
 
@@ -182,10 +182,10 @@ describe("an upload", () => {
     const files = new UploadFiles([{ name: "f/a.dcm", file: gone }]);
     files.piece = () => gone.slice();
     const store = new Store();
-    const { upload, told } = prepare(store, 0, files);
+    const { upload, reports } = prepare(store, 0, files);
     await upload.run();
     expect(store.requests).toEqual([]);
-    expect(told.at(-1)).toMatchObject({
+    expect(reports.at(-1)).toMatchObject({
       doing: "refused",
       line: "f/a.dcm has changed or is gone. Drop the files again.",
     });

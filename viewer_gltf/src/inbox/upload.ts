@@ -71,7 +71,7 @@ export class Upload {
   /** Stops sending. The bytes that have arrived stay on the server until the item is deleted. */
   cancel(): void {
     this.cancelled.abort();
-    this.tell({ doing: "cancelled", left_s: null });
+    this.report({ doing: "cancelled", left_s: null });
   }
 
   /** Tries a lost connection at once. */
@@ -86,9 +86,9 @@ export class Upload {
 
   /** Resolves when all bytes have arrived, or when the upload was refused or cancelled. */
   async run(): Promise<void> {
-    this.tell({ doing: "sending" });
+    this.report({ doing: "sending" });
     while (!this.isOver) {
-      if (this.state.sent >= this.state.total) this.tell({ doing: "complete", left_s: null });
+      if (this.state.sent >= this.state.total) this.report({ doing: "complete", left_s: null });
       else if (this.state.doing === "lost") await this.recover();
       else await this.sendNext();
     }
@@ -143,7 +143,7 @@ export class Upload {
     const answer = await this.attempt((signal) => this.server.askOffset(this.id, signal));
     if (answer === null || this.isOver) return;
     if (answer.offset !== null && answer.status < 300) {
-      this.tell({ doing: "sending", line: "" });
+      this.report({ doing: "sending", line: "" });
       this.place(answer.offset);
     } else if (!isPassing(answer.status)) this.refuse(answer.line || "The upload was deleted.");
   }
@@ -181,7 +181,7 @@ export class Upload {
     this.pieceBytes = Math.max(LEAST_BYTES, Math.round(wanted));
   }
 
-  /** The server has got to there: it answers again. */
+  /** Continues from the number of bytes that the server has. The next wait is short again, because the server answers. */
   private moveTo(offset: number): void {
     this.wait_ms = FIRST_WAIT_MS;
     this.place(offset);
@@ -190,19 +190,19 @@ export class Upload {
   private place(offset: number): void {
     const sent = Math.min(offset, this.state.total);
     const left_s = this.rate === null ? null : (this.state.total - sent) / this.rate;
-    this.tell({ sent, left_s });
+    this.report({ sent, left_s });
   }
 
   private lose(line: string): void {
     this.pieceBytes = Math.max(LEAST_BYTES, Math.round(this.pieceBytes / 2));
-    this.tell({ doing: "lost", left_s: null, line });
+    this.report({ doing: "lost", left_s: null, line });
   }
 
   private refuse(line: string): void {
-    this.tell({ doing: "refused", left_s: null, line });
+    this.report({ doing: "refused", left_s: null, line });
   }
 
-  private tell(changes: Partial<Progress>): void {
+  private report(changes: Partial<Progress>): void {
     if (this.isOver) return;
     this.state = { ...this.state, ...changes };
     this.onProgress(this.state);

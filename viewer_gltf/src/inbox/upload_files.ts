@@ -11,7 +11,7 @@ function belongsToImage(name: string): boolean {
   return !LEFT_BY_SYSTEM.test(parts[parts.length - 1]) && !parts.includes("__MACOSX");
 }
 
-/** Files of which bytes are sampled for the mark, at most, and the bytes at each of their ends. */
+/** Largest number of files that are sampled for the mark, and the bytes that are read at each end of a file. */
 const MARKED_FILES = 64;
 const MARKED_BYTES = 4096;
 

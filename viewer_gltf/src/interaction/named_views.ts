@@ -54,11 +54,11 @@ export class NamedViews {
 
   /** Sets the outermost points of the occupied part of the specimen, um. */
   setOccupied(points: readonly Vec3[]): void {
-    this.occupied = this.inRoom(points);
+    this.occupied = this.toScene(points);
   }
 
   /** Converts points of the specimen, um, to the scene, metres, as a flat screen shows it. */
-  inRoom(points: readonly Vec3[]): readonly Vec3[] {
+  toScene(points: readonly Vec3[]): readonly Vec3[] {
     const { center, scale } = this.placement;
     const [cx, cy, cz] = center;
     return points.map(([x, y, z]) => [(x - cx) * scale, (y - cy) * scale, (z - cz) * scale]);

@@ -141,8 +141,8 @@ describe("the opening", () => {
     for (let k = 0; k < 60; k++) {
       navigation.update(0.5);
       const seen = stick.map((point) => {
-        const inRoom = point.map((v, i) => (v - center[i]) * scale);
-        return new Vector3(...inRoom).project(navigation.camera);
+        const inScene = point.map((v, i) => (v - center[i]) * scale);
+        return new Vector3(...inScene).project(navigation.camera);
       });
       const most = Math.max(...seen.flatMap(({ x, y }) => [Math.abs(x), Math.abs(y)]));
       expect(most).toBeLessThan(0.95);

@@ -125,8 +125,8 @@ export class Navigation {
   }
 
   /** Converts points of the specimen, um, to the scene, metres, as a flat screen shows it. */
-  inRoom(points: readonly Vec3[]): readonly Vec3[] {
-    return this.views.inRoom(points);
+  toScene(points: readonly Vec3[]): readonly Vec3[] {
+    return this.views.toScene(points);
   }
 
   /** Largest distance of the eye from the middle during the opening's slow turn. */

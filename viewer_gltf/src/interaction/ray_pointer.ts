@@ -15,8 +15,8 @@ export type Hit = Readonly<{
   key: string | null;
   distance_m: number;
   /**
-   * Effect of holding the button: `slide` follows the ray until the button is released. `carry`
-   * does too. Without a button to hold, `carry` follows the ray from one choice to the next.
+   * Effect of holding the button: both kinds follow the ray until the button is released. Without
+   * a button to hold, `carry` follows the ray from one choice to the next.
    */
   hold?: "slide" | "carry";
   /** Command that repeats in small steps while the button is held or the gaze stays. */

@@ -47,7 +47,7 @@ export class TileTarget implements Target {
   }
 
   /** Takes over which objects are shown and which part of the specimen is clipped. */
-  follow({ objects, clip, channels, tool }: ViewerState): void {
+  sync({ objects, clip, channels, tool }: ViewerState): void {
     const content = [objects, clip, channels];
     if (content.some((each, i) => each !== this.content[i])) this.changes++;
     this.content = content;

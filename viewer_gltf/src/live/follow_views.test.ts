@@ -53,14 +53,14 @@ it("skips views that became outdated while another one was opening", async () =>
 
 it("shows the bundle last, at the page's own address, even if the first view had that address", async () => {
   const { show, shown, goOn } = page();
-  const told: boolean[] = [];
-  const views = new ViewFollower(ROOT, "", show, () => told.push(views.isNewestShown));
+  const changes: boolean[] = [];
+  const views = new ViewFollower(ROOT, "", show, () => changes.push(views.isNewestShown));
   views.take(BUNDLE);
   expect(views.isNewestShown).toBe(false);
   await goOn();
   views.take(BUNDLE);
   expect(shown).toEqual([ROOT]);
-  expect(told).toEqual([true]);
+  expect(changes).toEqual([true]);
 });
 
 it("tries a view again that could not be shown", async () => {

@@ -14,18 +14,18 @@ it.each([
 it("reports progress while the job runs, and not afterwards", async () => {
   const fetched = vi.fn(async (_: URL) => ({ json: async () => ({ share: 0.5 }) }));
   vi.stubGlobal("fetch", fetched);
-  const told: string[] = [];
+  const texts: string[] = [];
   let finish: (result: string) => void = () => undefined;
   const job = new Promise<string>((resolve) => {
     finish = resolve;
   });
-  const result = whileReading("http://localhost/x/", job, (words) => told.push(words));
-  await expect.poll(() => told).toEqual(["Reading the source: 50 %"]);
+  const result = whileReading("http://localhost/x/", job, (words) => texts.push(words));
+  await expect.poll(() => texts).toEqual(["Reading the source: 50 %"]);
   finish("manifest");
   expect(await result).toBe("manifest");
   expect(fetched.mock.calls[0][0].href).toBe("http://localhost/reading");
   await new Promise((resolve) => setTimeout(resolve, 700));
-  expect(told.length).toBe(1);
+  expect(texts.length).toBe(1);
 });
 
 it("passes on the job's fault, and survives a server that does not answer", async () => {

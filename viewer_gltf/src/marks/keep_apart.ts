@@ -1,6 +1,6 @@
 /** Moves labels that would overlap. The later one of two moves up or down. Pure. */
 
-/** A label's box in lines, y up. The lines of all labels look equally high. */
+/** A label's box. The unit is the height of a text line, which looks equal for all labels; y is up. */
 export type LabelBox = Readonly<{
   /** The lower left corner. */
   x: number;
@@ -21,15 +21,15 @@ export function keepApart(boxes: readonly LabelBox[]): readonly number[] {
     let y = box.y;
     // Each step passes one earlier label, which it can't meet again.
     for (let step = 0; step <= placed.length; step++) {
-      const met = placed.find(
+      const obstacle = placed.find(
         (other) =>
           box.x < other.x + other.width &&
           other.x < box.x + box.width &&
           y < other.y + other.height + GAP - 1e-9 &&
           other.y < y + box.height + GAP - 1e-9,
       );
-      if (met === undefined) break;
-      y = box.isAbove ? met.y + met.height + GAP : met.y - GAP - box.height;
+      if (obstacle === undefined) break;
+      y = box.isAbove ? obstacle.y + obstacle.height + GAP : obstacle.y - GAP - box.height;
     }
     placed.push({ ...box, y });
     return y - box.y;

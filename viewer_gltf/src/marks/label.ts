@@ -8,7 +8,7 @@ import {
   type Vector3,
 } from "three";
 import type { LabelBox } from "./keep_apart";
-import { LABEL_HEIGHT, lengthAt, MARKS_ORDER, type Sight } from "./style";
+import { type EyeView, LABEL_HEIGHT, lengthAt, MARKS_ORDER } from "./style";
 
 /** Pixels of the canvas for each line; enough for a headset and for a phone's dense screen. */
 const LINE_PX = 56;
@@ -64,7 +64,7 @@ export class Label {
   }
 
   /** Places the label at a point, um. */
-  place(point: Vector3, { eye_um, textZoom }: Sight): void {
+  place(point: Vector3, { eye_um, textZoom }: EyeView): void {
     if (!this.sprite.visible) return;
     const line = lengthAt(point, { eye_um, zoom: textZoom }, this.height_rad);
     const height = line * this.lines;
@@ -79,7 +79,7 @@ export class Label {
   }
 
   /** Returns the label's box as an eye with these axes sees it, in lines. */
-  boxFrom({ eye_um }: Pick<Sight, "eye_um">, right: Vector3, up: Vector3): LabelBox {
+  boxFrom({ eye_um }: Pick<EyeView, "eye_um">, right: Vector3, up: Vector3): LabelBox {
     const { position, scale, center } = this.sprite;
     const line = scale.y / Math.max(1, this.lines);
     const from = position.clone().sub(eye_um);

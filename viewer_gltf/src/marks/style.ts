@@ -49,7 +49,7 @@ export const LABEL_HEIGHT = 1.15 * RADIANS;
 export const LABEL_PX = 20;
 
 /** The eye's position in um, its up direction of any length, and factors to the angles of marks in a headset. */
-export type Sight = Readonly<{
+export type EyeView = Readonly<{
   eye_um: Vector3;
   up: Vector3;
   /** Factor to the angles of marks. */
@@ -68,7 +68,7 @@ export function screenZoom(px_per_rad: number): number {
 /** Returns the length, um, that appears under an angle at a point. */
 export function lengthAt(
   point: Vector3,
-  { eye_um, zoom }: Pick<Sight, "eye_um" | "zoom">,
+  { eye_um, zoom }: Pick<EyeView, "eye_um" | "zoom">,
   angle_rad: number,
 ): number {
   return 2 * Math.tan((zoom * angle_rad) / 2) * point.distanceTo(eye_um);

@@ -3,8 +3,8 @@ import { distanceText, sizeText } from "./length_text";
 
 describe("a distance", () => {
   it("is written with three digits in the unit that gives the shortest text", () => {
-    const said = [0, 0.0123, 0.4567, 0.9996, 1, 9.996, 12.34, 123.4, 999.4, 999.9, 12345, 1.5e6];
-    expect(said.map(distanceText)).toEqual([
+    const texts = [0, 0.0123, 0.4567, 0.9996, 1, 9.996, 12.34, 123.4, 999.4, 999.9, 12345, 1.5e6];
+    expect(texts.map(distanceText)).toEqual([
       "0 µm",
       "12.3 nm",
       "457 nm",

@@ -72,7 +72,7 @@ describe("the tile under the gaze in a clipped specimen", () => {
     const anywhere = (): Vec3 => [part(-5, 25), part(-15, 5), part(-5, 10)];
     const isWithin = (p: Vec3, { bounds_um }: BoxedTile) =>
       isKept(p, { box: bounds_um, plane: null });
-    let met = 0;
+    let hits = 0;
     for (let run = 0; run < 400; run++) {
       const [a, b, origin, to] = [anywhere(), anywhere(), anywhere(), anywhere()];
       const direction: Vec3 = [to[0] - origin[0], to[1] - origin[1], to[2] - origin[2]];
@@ -95,9 +95,9 @@ describe("the tile under the gaze in a clipped specimen", () => {
         if (isKept(p, clip) && TILES.some((tile) => isWithin(p, tile))) first = t;
       }
       if (first === null) continue; // less than one step of the tile is left, or nothing
-      met++;
+      hits++;
       expect(Math.abs((found?.distance ?? Number.NaN) - first)).toBeLessThan(2 * step);
     }
-    expect(met).toBeGreaterThan(50);
+    expect(hits).toBeGreaterThan(50);
   });
 });

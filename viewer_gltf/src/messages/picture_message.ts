@@ -24,9 +24,9 @@ export class PictureMessage {
 
   /** Updates the message to the present state and to the files that have arrived. */
   update(): void {
-    const { state, display, isInRoom, hasStandingPart } = this.host;
+    const { state, display, isInStereo, hasStandingPart } = this.host;
     if (display.isLoading) return;
-    const empty = isInRoom || hasStandingPart ? null : emptyViewOf(state, this.content);
+    const empty = isInStereo || hasStandingPart ? null : emptyViewOf(state, this.content);
     this.message.show(empty && { text: empty.text, ...this.buttonOf(empty.offer) });
   }
 
@@ -65,7 +65,7 @@ export class PictureMessage {
         this.requestList(channel);
         return this.known.has(channel) ? volumes?.source(tile, channel) != null : null;
       },
-      objectsLeft: (channel) => host.service("objects")?.left(channel) ?? null,
+      shownObjectCount: (channel) => host.service("objects")?.shownCount(channel) ?? null,
     };
   }
 

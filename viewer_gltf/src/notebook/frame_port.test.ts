@@ -17,21 +17,18 @@ describe("a state that a page sends to the viewer in its frame", () => {
   });
 
   it.each([
-    [null, "state: found null, expected an object"],
-    [{ zoom: 3 }, "zoom: expected link, channels, view or picked"],
-    [{ link: 3 }, "link: found 3, expected a text"],
-    [{ channels: { cd3: {} } }, "channels.cd3: expected one of dna, cd8"],
-    [{ channels: { dna: { color: "red" } } }, 'channels.dna.color: found "red", expected #rrggbb'],
-    [{ channels: { dna: { opacity: 2 } } }, "channels.dna.opacity: found 2, expected 0 to 1"],
+    [null, "state is null, expected an object"],
+    [{ zoom: 3 }, "zoom is unknown, expected link, channels, view or picked"],
+    [{ link: 3 }, "link is 3, expected a text"],
+    [{ channels: { cd3: {} } }, "channels.cd3 is unknown, expected one of dna, cd8"],
+    [{ channels: { dna: { color: "red" } } }, 'channels.dna.color is "red", expected #rrggbb'],
+    [{ channels: { dna: { opacity: 2 } } }, "channels.dna.opacity is 2, expected 0 to 1"],
     [
       { channels: { dna: { gamma: 1 } } },
-      "channels.dna.gamma: found gamma, expected one of visible, color, opacity, window",
+      "channels.dna.gamma is unknown, expected one of visible, color, opacity, window",
     ],
-    [
-      { view: { eye_um: [0, Number.NaN, 1] } },
-      "view.eye_um: found [0,null,1], expected three numbers",
-    ],
-    [{ picked: 3 }, "picked: found 3, expected an object"],
+    [{ view: { eye_um: [0, Number.NaN, 1] } }, "view.eye_um is [0,null,1], expected three numbers"],
+    [{ picked: 3 }, "picked is 3, expected an object"],
   ])("is refused with the field and what was expected: %j", (state, fault) => {
     expect(faultOfState(state, CHANNELS)).toBe(fault);
   });

@@ -46,13 +46,13 @@ function faultOfFields(
   value: unknown,
   fields: Readonly<Record<string, readonly [Check, string]>>,
 ): string | null {
-  if (!isRecord(value)) return `${name}: found ${JSON.stringify(value)}, expected an object`;
+  if (!isRecord(value)) return `${name} is ${JSON.stringify(value)}, expected an object`;
   for (const [key, field] of Object.entries(value)) {
     const known = fields[key];
     const expected = known?.[1] ?? `one of ${Object.keys(fields).join(", ")}`;
     if (!known?.[0](field)) {
-      const found = known === undefined ? key : JSON.stringify(field);
-      return `${name}.${key}: found ${found}, expected ${expected}`;
+      const found = known === undefined ? "unknown" : JSON.stringify(field);
+      return `${name}.${key} is ${found}, expected ${expected}`;
     }
   }
   return null;
@@ -60,7 +60,7 @@ function faultOfFields(
 
 /** Returns the reason why a state can't be shown; null if it can. @param channels the IDs of the bundle's channels */
 export function faultOfState(state: unknown, channels: readonly string[]): string | null {
-  if (!isRecord(state)) return `state: found ${JSON.stringify(state)}, expected an object`;
+  if (!isRecord(state)) return `state is ${JSON.stringify(state)}, expected an object`;
   for (const [key, value] of Object.entries(state)) {
     const fault = faultOfPart(key, value, channels);
     if (fault !== null) return fault;
@@ -71,22 +71,22 @@ export function faultOfState(state: unknown, channels: readonly string[]): strin
 function faultOfPart(key: string, value: unknown, channels: readonly string[]): string | null {
   switch (key) {
     case "link":
-      return isText(value) ? null : `link: found ${JSON.stringify(value)}, expected a text`;
+      return isText(value) ? null : `link is ${JSON.stringify(value)}, expected a text`;
     case "view":
       return faultOfFields("view", value, OF_VIEW);
     case "picked":
       return value === null ? null : faultOfFields("picked", value, OF_PICKED);
     case "channels": {
-      if (!isRecord(value)) return `channels: found ${JSON.stringify(value)}, expected an object`;
+      if (!isRecord(value)) return `channels is ${JSON.stringify(value)}, expected an object`;
       const faults = Object.entries(value).map(([id, look]) =>
         channels.includes(id)
           ? faultOfFields(`channels.${id}`, look, OF_CHANNEL)
-          : `channels.${id}: expected one of ${channels.join(", ")}`,
+          : `channels.${id} is unknown, expected one of ${channels.join(", ")}`,
       );
       return faults.find((fault) => fault !== null) ?? null;
     }
     default:
-      return `${key}: expected link, channels, view or picked`;
+      return `${key} is unknown, expected link, channels, view or picked`;
   }
 }
 

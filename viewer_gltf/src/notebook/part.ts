@@ -28,8 +28,8 @@ class NotebookPart implements Part {
     return portToHolder(search, this.host.bundle.manifest);
   }
 
-  hearTap(tap: Tap): void {
-    this.view?.hearTap(tap);
+  onTap(tap: Tap): void {
+    this.view?.onTap(tap);
   }
 
   dispose(): void {

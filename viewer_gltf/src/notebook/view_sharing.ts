@@ -121,20 +121,20 @@ export class ViewSharing {
     host.changed.subscribe(() => this.note());
     host.drawn.subscribe(() => this.note());
     port.addEventListener("message", ({ data }: MessageEvent) => {
-      if (data.type === "state") this.follow(data.state);
+      if (data.type === "state") this.sync(data.state);
     });
     port.postMessage({ type: "open" });
     void display.settled().then(() => port.postMessage({ type: "shown" }));
     this.note();
   }
 
-  hearTap({ ray }: Tap): void {
+  onTap({ ray }: Tap): void {
     void this.look(ray);
   }
 
   /** Schedules a message, because the view may have changed. */
   private note(): void {
-    if (this.timer === 0) this.timer = window.setTimeout(() => this.tell(), BETWEEN_MS);
+    if (this.timer === 0) this.timer = window.setTimeout(() => this.sendShared(), BETWEEN_MS);
   }
 
   private get ranges(): ReadonlyMap<string, readonly [number, number]> {
@@ -164,7 +164,7 @@ export class ViewSharing {
     };
   }
 
-  private tell(): void {
+  private sendShared(): void {
     this.timer = 0;
     const now = this.shared;
     const news = Object.entries(now).filter(
@@ -178,14 +178,14 @@ export class ViewSharing {
   }
 
   /** Shows the state that Python requests, and sends the resulting state. */
-  private follow(asked: Asked): void {
+  private sync(asked: Asked): void {
     const { host } = this;
     this.known = { ...this.known, ...(asked as Partial<Shared>) };
     host.viewpoint.stopTurning();
-    this.followLooks(asked);
+    this.applyState(asked);
     if (asked.link !== undefined && asked.link !== this.shared.link) {
       this.openLink(asked.link);
-      this.followLooks(asked);
+      this.applyState(asked);
     }
     if (asked.picked !== undefined && !isSame(asked.picked, this.picked)) {
       this.picked = asked.picked;
@@ -195,7 +195,7 @@ export class ViewSharing {
     this.note();
   }
 
-  private followLooks(asked: Asked): void {
+  private applyState(asked: Asked): void {
     const { host, ranges } = this;
     const { viewpoint } = host;
     for (const channel of host.state.channels) {
@@ -224,11 +224,11 @@ export class ViewSharing {
 
   private async look(ray: Ray): Promise<void> {
     const hit = this.host.objectAlong(ray);
-    const met = await this.host.reading.probe(ray);
-    if (met === null) return;
-    const [x, y, z] = met.point.map(rounded);
-    const { tile } = met;
-    const channel = hit?.channel ?? met.channel;
+    const probed = await this.host.reading.probe(ray);
+    if (probed === null) return;
+    const [x, y, z] = probed.point.map(rounded);
+    const { tile } = probed;
+    const channel = hit?.channel ?? probed.channel;
     this.picked = { point_um: [x, y, z], tile, channel, object: hit?.object?.label ?? null };
     this.note();
   }
@@ -239,7 +239,7 @@ export class ViewSharing {
     await display.settled();
     const { link } = this.shared;
     // If the view has changed since the last message, the next message schedules another picture.
-    if (link === this.pictured || link !== this.known.link || this.host.isInRoom) return;
+    if (link === this.pictured || link !== this.known.link || this.host.isInStereo) return;
     if (isTraced(this.host.state) && display.snapshot().traced.samples < MIN_SAMPLES) {
       this.rest = window.setTimeout(() => void this.picture(), REST_MS);
       return;

@@ -22,13 +22,13 @@ const LOADING: Section["items"] = [
 export function labelMapSections(
   state: ViewerState,
   made: ReadonlyMap<string, Section["items"]>,
-  isInRoom: boolean,
+  isInStereo: boolean,
 ): readonly PartSection[] {
   return labelMapsOf(state).map(({ id, name }, _, { length }) => ({
     id: objectsSection(id, length),
     label: length === 1 ? "Objects" : `Objects: ${name}`,
     rank: 20,
-    items: made.get(id) ?? (isInRoom ? [] : LOADING),
+    items: made.get(id) ?? (isInStereo ? [] : LOADING),
   }));
 }
 

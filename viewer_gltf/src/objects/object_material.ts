@@ -115,12 +115,12 @@ export class ObjectMaterial {
   /**
    * @param boxes six values for each row, in um: the smallest x, y, z and the largest
    * @param inset_um distance by which each surface is moved into its object
-   * @param umToRoom matrix from um to the scene; the caller changes it in place
+   * @param umToScene matrix from um to the scene; the caller changes it in place
    */
   constructor(
     boxes: Float32Array,
     private readonly inset_um: number,
-    umToRoom: Matrix4,
+    umToScene: Matrix4,
   ) {
     const count = boxes.length / 6;
     this.flags = bytesTexture(count);
@@ -134,7 +134,7 @@ export class ObjectMaterial {
       uIsColored: { value: false },
       uInset: { value: 0 },
       uMiddles: { value: this.middles },
-      uUmToRoom: { value: umToRoom },
+      uUmToScene: { value: umToScene },
       uGap: { value: 0 },
       uStained: { value: 0 },
       uStain: { value: new Color(1, 1, 1) },

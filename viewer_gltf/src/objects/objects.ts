@@ -41,7 +41,7 @@ export type ObjectsOptions = Readonly<{
 export class Objects {
   readonly flags: Uint8Array;
   /** Number of shown objects. */
-  left = 0;
+  shownCount = 0;
   private readonly material: ObjectMaterial;
   private view: ObjectView = START_OBJECTS;
   /** The channel whose intensity is painted on the objects. */
@@ -65,8 +65,8 @@ export class Objects {
   ) {
     const { min, max } = options.manifest.specimen.bounds_um;
     const edge_um = Math.max(...max.map((v, i) => v - min[i]));
-    const umToRoom = options.specimen.matrixWorld;
-    this.material = new ObjectMaterial(table.boxes, INSET * edge_um, umToRoom);
+    const umToScene = options.specimen.matrixWorld;
+    this.material = new ObjectMaterial(table.boxes, INSET * edge_um, umToScene);
     this.flags = new Uint8Array(table.count);
     this.adoptAll();
   }
@@ -94,7 +94,7 @@ export class Objects {
 
   /** A text that changes whenever other objects are shown or lit. */
   get version(): string {
-    return `${this.drawn.flags} ${this.left}`;
+    return `${this.drawn.flags} ${this.shownCount}`;
   }
 
   /** Name of the channel that is painted on the objects; "": none is. */
@@ -198,7 +198,7 @@ export class Objects {
     }
     if (this.isFirst || next.flags !== this.drawn.flags) {
       const neighbours = view.picked === null ? [] : table.neighbours(view.picked);
-      this.left = flag(this.flags, view, (id) => table.bytes(id), neighbours);
+      this.shownCount = flag(this.flags, view, (id) => table.bytes(id), neighbours);
       material.setFlags(this.flags);
       this.drawn = { ...this.drawn, flags: next.flags };
     }

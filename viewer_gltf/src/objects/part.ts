@@ -103,13 +103,13 @@ class ObjectsPart implements Part, ObjectMaps {
   }
 
   panel(): readonly PartSection[] {
-    const { state, isInRoom } = this.host;
+    const { state, isInStereo } = this.host;
     const { shown } = this;
     const items = shown.map(({ channel: { id }, objects }, i) => {
       const isLast = i === shown.length - 1;
       return [id, this.makeItems(objects, state, id, isLast)] as const;
     });
-    return labelMapSections(state, new Map(items), isInRoom);
+    return labelMapSections(state, new Map(items), isInStereo);
   }
 
   pick(ray: Ray): Hit | null {
@@ -134,11 +134,11 @@ class ObjectsPart implements Part, ObjectMaps {
     objects.pick(object.row, by === "gaze");
     if (channel !== null && this.host.state.objects[channel]?.picked === object.row) {
       this.host.announce(`Object ${object.name}`);
-      if (by !== "gaze" && !this.host.isInRoom) {
+      if (by !== "gaze" && !this.host.isInStereo) {
         this.host.revealed.emit(`${channel}/objects-card`);
       }
     }
-    return "met";
+    return "shared";
   }
 
   /** Saves a CSV file for each shown label map. */
@@ -177,8 +177,8 @@ class ObjectsPart implements Part, ObjectMaps {
     return new Map(this.shown.map(({ channel: { id }, objects }) => [id, objects.shown]));
   }
 
-  left(channel: string): number | null {
-    return this.objects.get(channel)?.left ?? null;
+  shownCount(channel: string): number | null {
+    return this.objects.get(channel)?.shownCount ?? null;
   }
 
   retryFailed(): void {

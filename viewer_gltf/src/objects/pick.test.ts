@@ -68,10 +68,10 @@ describe("a ray among objects", () => {
     pickObject(ray, world, surfaces, boxes, gap_um, flags, clip);
 
   it("hits the nearest object at its surface, with the distance in lengths of its direction", () => {
-    const met = pick(ALONG);
-    expect(met?.row).toBe(0);
-    expect(met?.tile).toBe("r0_c0");
-    expect(met?.distance).toBeCloseTo((10 - Math.sqrt(1 - 0.02)) / 2, 1);
+    const hit = pick(ALONG);
+    expect(hit?.row).toBe(0);
+    expect(hit?.tile).toBe("r0_c0");
+    expect(hit?.distance).toBeCloseTo((10 - Math.sqrt(1 - 0.02)) / 2, 1);
     expect(pick({ origin: [0.1, 0.1, 20], direction: [0, 0, -1] })?.row).toBe(2);
   });
 
@@ -98,15 +98,15 @@ describe("a ray among objects", () => {
 
   it("hits an object where it is drawn, shrunk by the gap", () => {
     const gapped = (ray: Ray, clip = WHOLE) => pick(ray, ALL, clip, 0.8); // the balls are drawn with radius 0.6
-    const met = gapped(ALONG);
-    expect(met?.row).toBe(0);
-    expect(met?.distance).toBeCloseTo((10 - Math.sqrt(0.36 - 0.02)) / 2, 1);
+    const hit = gapped(ALONG);
+    expect(hit?.row).toBe(0);
+    expect(hit?.distance).toBeCloseTo((10 - Math.sqrt(0.36 - 0.02)) / 2, 1);
     const beside: Ray = { origin: [0.7, 0, -10], direction: [0, 0, 1] };
     expect(pick(beside)?.row).toBe(0);
     expect(gapped(beside)).toBeNull();
     // this cut passes in front of the drawn object, through its place without a gap
     const plane = { normal: [0, 0, -1] as const, offset_um: 0.7 };
-    expect(gapped(ALONG, { ...WHOLE, plane })?.distance).toBeCloseTo(met?.distance ?? 0, 9);
+    expect(gapped(ALONG, { ...WHOLE, plane })?.distance).toBeCloseTo(hit?.distance ?? 0, 9);
     expect(pick(ALONG, ALL, WHOLE, 99)?.row).toBe(0); // a fifth of its size is left
   });
 

@@ -65,7 +65,7 @@ class ObjectSection {
     const by = table.column(objects.colorBy);
     const others = Object.keys({ ...view.ranges, ...view.without }).filter((id) => id !== by?.id);
     return [
-      this.controls.text("count", "Shown", `${objects.left} of ${table.count} objects`),
+      this.controls.text("count", "Shown", `${objects.shownCount} of ${table.count} objects`),
       this.controls.columnChoice(
         "color-by",
         "Colour by",

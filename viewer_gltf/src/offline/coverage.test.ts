@@ -9,8 +9,8 @@ const LAYER: Layer = ["a", "b"].map((tile) => ({
   levels: [0, 1, 2].map((level) => [file(`${tile}/${level}`)]),
 }));
 const keysOf = (...names: readonly string[]) => new Set(names.map((name) => keyOf(file(name))));
-const coverage = (come: readonly string[], kept = come) =>
-  coverageOf(["a", "b"], [LAYER], come.map(file), keysOf(...kept)).tiles;
+const coverage = (answered: readonly string[], kept = answered) =>
+  coverageOf(["a", "b"], [LAYER], answered.map(file), keysOf(...kept)).tiles;
 
 it("counts every tile if all tiles were shown at the same level", () => {
   expect(coverage(["a/2", "b/2"])).toBe(2);
@@ -32,8 +32,8 @@ it("counts a level that an earlier visit has kept", () => {
 
 it("expects the finest level of a tile that has fewer levels", () => {
   const short: Layer = [LAYER[0], { tile: "b", levels: LAYER[1].levels.slice(0, 1) }];
-  const come = ["a/2", "b/0"];
-  expect(coverageOf(["a", "b"], [short], come.map(file), keysOf(...come)).tiles).toBe(1);
+  const answered = ["a/2", "b/0"];
+  expect(coverageOf(["a", "b"], [short], answered.map(file), keysOf(...answered)).tiles).toBe(1);
   const fine = ["a/0", "b/0"];
   expect(coverageOf(["a", "b"], [short], fine.map(file), keysOf(...fine)).tiles).toBe(2);
 });
@@ -44,7 +44,7 @@ it("ignores a layer that was never shown", () => {
 
 it("announces that every place is kept, or how much is kept and why not more", () => {
   expect(coverageText({ tiles: 10 }, 10)).toMatch(/^Ready offline: /);
-  const more = "Each tile that you look at from near is kept, too.";
+  const more = "A tile is also kept once you have looked at it from near.";
   expect(coverageText({ tiles: 3 }, 10)).toBe(
     `Kept for offline: the overview and 3 of 10 tiles. ${more}`,
   );

@@ -19,16 +19,16 @@ export type Coverage = Readonly<{
 /**
  * Counts the tiles that are kept in all layers.
  *
- * @param come the requests that were answered
+ * @param answered the requests that were answered
  * @param kept keys of the requests that need no network
  */
 export function coverageOf(
   tiles: readonly string[],
   layers: readonly Layer[],
-  come: readonly Asked[],
+  answered: readonly Asked[],
   kept: ReadonlySet<string>,
 ): Coverage {
-  const shown = new Set(come.map(keyOf));
+  const shown = new Set(answered.map(keyOf));
   const hasAll = (asked: readonly Asked[], keys: ReadonlySet<string>) =>
     asked.every((each) => keys.has(keyOf(each)));
   const missing = new Set<string>();
@@ -46,13 +46,13 @@ export function coverageOf(
   return { tiles: tiles.filter((tile) => !missing.has(tile)).length };
 }
 
-const MORE = "Each tile that you look at from near is kept, too.";
+const MORE = "A tile is also kept once you have looked at it from near.";
 const BY_VIEW = "This host sends volumes for each view, so volumes need the network.";
 
 /** Returns the sentences that the page announces: how much is kept, and why not more. */
 export function coverageText({ tiles, isByView = false }: Coverage, of: number): string {
   if (tiles === of)
-    return "Ready offline: every place opens without a network, as you have seen it.";
+    return "Ready offline: the whole specimen opens without a network, as detailed as you have seen it.";
   const places = tiles === 0 ? "" : ` and ${tiles} of ${of} tiles`;
   return `Kept for offline: the overview${places}. ${isByView ? BY_VIEW : MORE}`;
 }

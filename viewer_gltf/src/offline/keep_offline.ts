@@ -1,7 +1,7 @@
 /** Keeps everything that was shown for a visit without a network, and announces how much that is. */
 
 import type { Bundle } from "../bundle/load";
-import { allCome, keyOf } from "../bundle/request_log";
+import { allAnswered, keyOf } from "../bundle/request_log";
 import type { PartHost } from "../host/part";
 import { arAddress } from "../panel/html/entry_buttons";
 import { showsVolumes } from "../state/viewer_state";
@@ -24,7 +24,7 @@ export class KeepOffline {
   /** The number of answers and the layers shown at the last check; a check without a change is skipped. */
   private looked = "";
   /** Whether this visit, or one before, has announced how much is kept. */
-  private hasSaid: boolean;
+  private hasAnnounced: boolean;
   private isReady: boolean;
   /** Requests that the worker had missed and was asked to keep. */
   private readonly missed = new Set<string>();
@@ -34,7 +34,7 @@ export class KeepOffline {
     private readonly keeping: Keeping,
   ) {
     this.layers = new OfflineLayers(host);
-    this.hasSaid = keeping.wasServed;
+    this.hasAnnounced = keeping.wasServed;
     this.isReady = keeping.wasServed;
   }
 
@@ -60,7 +60,7 @@ export class KeepOffline {
     const { state, display } = this.host;
     const { channels, mode } = state;
     const shown = channels.filter((each) => each.shown).map(({ id, volume }) => [id, volume]);
-    const looked = JSON.stringify([allCome().length, mode, shown]);
+    const looked = JSON.stringify([allAnswered().length, mode, shown]);
     if (looked === this.looked || display.isLoading || !navigator.onLine) return;
     const coverage = await this.coverage();
     if (coverage === "later") return;
@@ -72,12 +72,14 @@ export class KeepOffline {
   private async coverage(): Promise<Coverage | "later" | null> {
     const { host, keeping } = this;
     const layers = await this.layers.now();
-    const come = allCome();
+    const answered = allAnswered();
     const levels = layers.flat().flatMap((each) => each.levels.flat());
-    const asked = [...new Map([...come, ...levels].map((each) => [keyOf(each), each])).values()];
+    const asked = [
+      ...new Map([...answered, ...levels].map((each) => [keyOf(each), each])).values(),
+    ];
     const areKept = await keeping.isKept(asked);
     const kept = new Set(asked.filter((_, i) => areKept[i]).map(keyOf));
-    const missed = come.filter((each) => !kept.has(keyOf(each)));
+    const missed = answered.filter((each) => !kept.has(keyOf(each)));
     const news = missed.filter((each) => !this.missed.has(keyOf(each)));
     if (news.length > 0) {
       for (const each of news) this.missed.add(keyOf(each));
@@ -89,7 +91,7 @@ export class KeepOffline {
     // Bricks are sent for each view, so that the host is needed for each view.
     if (bricks !== undefined && showsVolumes(host.state)) return { tiles: 0, isByView: true };
     const tiles = manifest.tiles.map(({ id }) => id);
-    return coverageOf(tiles, layers, come, kept);
+    return coverageOf(tiles, layers, answered, kept);
   }
 
   private report(coverage: Coverage | null): void {
@@ -97,9 +99,9 @@ export class KeepOffline {
     const isReady = coverage?.tiles === length;
     document.documentElement.dataset.offline = isReady ? "ready" : "partly";
     // Only the first state and "ready" are announced; an announcement for each further tile would disturb.
-    if (coverage !== null && (!this.hasSaid || (isReady && !this.isReady))) {
-      this.host.service("page")?.say(coverageText(coverage, length));
-      this.hasSaid = true;
+    if (coverage !== null && (!this.hasAnnounced || (isReady && !this.isReady))) {
+      this.host.service("page")?.showAnnouncement(coverageText(coverage, length));
+      this.hasAnnounced = true;
     }
     this.isReady = isReady;
   }

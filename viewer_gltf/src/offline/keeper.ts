@@ -182,11 +182,11 @@ export class Keeper {
     }
     const ref = Object.hasOwn(listed, path) ? listed[path] : undefined;
     if (ref === undefined || !isKept({ path, ...ref })) return fetch(request);
-    const isAskedAnew = request.cache === "reload"; // the page found a wrong hash in the kept file
+    const isReload = request.cache === "reload"; // the page found a wrong hash in the kept file
     const part =
       range === null ? null : await this.store.get(this.keys.file(base, ref.sha256, range));
     const kept = part ?? (await this.store.get(this.keys.file(base, ref.sha256)));
-    if (kept !== null && !isAskedAnew) return kept; // a whole file may answer a request for a range, as HTTP allows
+    if (kept !== null && !isReload) return kept; // a whole file may answer a request for a range, as HTTP allows
     const response = await fetch(request);
     if (response.ok) later(this.keepFile(base, { path, ...ref }, range, response.clone()));
     return response;

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { fromText, outOfRoom, toText, totalBytes } from "./ledger";
+import { fromText, keysToDrop, toText, totalBytes } from "./ledger";
 
 const LEDGER = new Map([
   ["new", { bytes: 30, used_ms: 3 }],
@@ -10,11 +10,11 @@ const LEDGER = new Map([
 describe("the offline store's ledger", () => {
   it("drops the least recently used entries, and only as many as necessary", () => {
     expect(totalBytes(LEDGER)).toBe(60);
-    expect(outOfRoom(LEDGER, 60)).toEqual([]);
-    expect(outOfRoom(LEDGER, 55)).toEqual(["old"]);
-    expect(outOfRoom(LEDGER, 50)).toEqual(["old"]);
-    expect(outOfRoom(LEDGER, 49)).toEqual(["old", "middle"]);
-    expect(outOfRoom(LEDGER, 0)).toEqual(["old", "middle", "new"]);
+    expect(keysToDrop(LEDGER, 60)).toEqual([]);
+    expect(keysToDrop(LEDGER, 55)).toEqual(["old"]);
+    expect(keysToDrop(LEDGER, 50)).toEqual(["old"]);
+    expect(keysToDrop(LEDGER, 49)).toEqual(["old", "middle"]);
+    expect(keysToDrop(LEDGER, 0)).toEqual(["old", "middle", "new"]);
   });
 
   it("is the same after writing and reading", () => {

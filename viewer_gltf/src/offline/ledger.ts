@@ -11,7 +11,7 @@ export function totalBytes(ledger: Ledger): number {
 }
 
 /** Returns the keys to drop so that at most `limit_bytes` are left; the least recently used come first. */
-export function outOfRoom(ledger: Ledger, limit_bytes: number): string[] {
+export function keysToDrop(ledger: Ledger, limit_bytes: number): string[] {
   let excess = totalBytes(ledger) - limit_bytes;
   const dropped: string[] = [];
   const oldest = [...ledger].sort(([, a], [, b]) => a.used_ms - b.used_ms);

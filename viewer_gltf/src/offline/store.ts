@@ -2,7 +2,7 @@
  * Keeps files for use without a network, in a Cache of the browser with a limited size. The least recently used files
  * are dropped first. Sizes and times of use are in a ledger, since a Cache does not have them.
  */
-import { fromText, outOfRoom, toText, type Use } from "./ledger";
+import { fromText, keysToDrop, toText, type Use } from "./ledger";
 
 const LIMIT_BYTES = 512 * 1024 * 1024;
 /** Share of the kept bytes that stays after the browser has refused to store more. */
@@ -72,12 +72,12 @@ export class Store {
     if (type !== null) headers.set("Content-Type", type);
     if (range !== undefined && range !== null) headers.set(PART, range); // a Cache refuses 206
     this.ledger.set(key, { bytes, used_ms: Date.now() });
-    await this.drop(outOfRoom(this.ledger, this.limit_bytes));
+    await this.drop(keysToDrop(this.ledger, this.limit_bytes));
     try {
       await this.cache.put(key, new Response(body, { headers }));
     } catch {
       this.ledger.delete(key);
-      await this.makeRoom();
+      await this.freeSpace();
     }
   }
 
@@ -98,10 +98,10 @@ export class Store {
     return this.saving;
   }
 
-  private async makeRoom(): Promise<void> {
+  private async freeSpace(): Promise<void> {
     let held = 0;
     for (const { bytes } of this.ledger.values()) held += bytes;
-    await this.drop(outOfRoom(this.ledger, KEPT_AT_REFUSAL * held));
+    await this.drop(keysToDrop(this.ledger, KEPT_AT_REFUSAL * held));
   }
 
   private async drop(keys: readonly string[]): Promise<void> {

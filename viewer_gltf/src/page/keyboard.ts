@@ -105,7 +105,7 @@ export class Keyboard {
   private offerBack(request: Request, text: string, { mark, view }: Before): boolean {
     const { host } = this;
     const now = host.panel.view;
-    const isOwnAnswer = request === "share" || now.isHelpOpen || host.isInRoom;
+    const isOwnAnswer = request === "share" || now.isHelpOpen || host.isInStereo;
     if (isOwnAnswer || !(host.undo.hasChangedSince(mark) || view !== now)) return false;
     const words = view.isHidden === now.isHidden ? text : HIDDEN[String(now.isHidden)];
     const accident = { mark, view, after: host.undo.newest };

@@ -14,7 +14,7 @@ import { wayToStereo } from "../xr/support";
 let wasTouched = false;
 
 export class Overlays {
-  readonly said = new Announcement();
+  readonly announcement = new Announcement();
   private readonly entryButtons = new EntryButtons();
   private readonly hint: FirstHint;
 
@@ -23,7 +23,7 @@ export class Overlays {
     private readonly page: Pick<PagePanel, "perform">,
     private readonly signal: AbortSignal,
   ) {
-    const { said, entryButtons } = this;
+    const { announcement, entryButtons } = this;
     const progress = new ProgressBar();
     const notices = new Notices(
       (texts) => host.dispatch({ type: "dismiss", texts }),
@@ -33,7 +33,14 @@ export class Overlays {
     const backButton = new BackButton(() => host.run("back"));
     this.hint = hint;
     host.view.append(
-      ...[hint.root, progress.root, said.root, notices.root, entryButtons.root, backButton.root],
+      ...[
+        hint.root,
+        progress.root,
+        announcement.root,
+        notices.root,
+        entryButtons.root,
+        backButton.root,
+      ],
     );
     host.changed.subscribe((state) => {
       for (const each of [notices, hint, backButton]) each.update(state);

@@ -39,7 +39,7 @@ class PagePart implements Part, PagePanel {
     this.html = new Panel((request) => this.perform(request));
     parent.append(this.html.root);
     this.keyboard = new Keyboard(host, this, parent, signal);
-    host.announced.subscribe((text) => this.say(text));
+    host.announced.subscribe((text) => this.showAnnouncement(text));
     host.revealed.subscribe((control) => this.html.reveal(control));
     host.changed.subscribe(() => this.refresh());
     host.panel.onChange(() => this.refresh());
@@ -63,7 +63,7 @@ class PagePart implements Part, PagePanel {
   }
 
   afterOverview(): void {
-    if (pixelShare() < 1) this.say(FEWER_PIXELS);
+    if (pixelShare() < 1) this.showAnnouncement(FEWER_PIXELS);
   }
 
   private refresh(): void {
@@ -71,7 +71,7 @@ class PagePart implements Part, PagePanel {
     this.timer = 0;
     const { panel } = this.host;
     this.html.update(panel.buildPagePanel());
-    if (this.keyboard.update()) this.overlays.said.withdraw();
+    if (this.keyboard.update()) this.overlays.announcement.withdraw();
     panel.noteShown();
   }
 
@@ -99,12 +99,12 @@ class PagePart implements Part, PagePanel {
     return this.html.focus(control);
   }
 
-  say(words: string): void {
-    this.overlays.said.say(words);
+  showAnnouncement(words: string): void {
+    this.overlays.announcement.show(words);
   }
 
   offer(words: string, label: string, act: () => void): void {
-    this.overlays.said.offer(words, label, act);
+    this.overlays.announcement.offer(words, label, act);
   }
 
   /** Announces why a request has no effect now, with a button if the refusal has one. */
@@ -112,7 +112,7 @@ class PagePart implements Part, PagePanel {
     const { host } = this;
     const words = withKeys(refusal, host.panel.view.keyChanges);
     host.announce(words);
-    if (host.isInRoom) return;
+    if (host.isInStereo) return;
     const button = (await host.service("messages")?.buttonFor(refusal)) ?? null;
     if (button !== null) this.offer(words, button.label, button.act);
   }

@@ -32,9 +32,9 @@ const STILL: HistogramPoint = { value: 1 / 255, gradient: 1 / 63 };
 const PLACES = [0.3, 0.5, 0.7, 0.4, 0.6];
 
 /** Returns the index of the selected shape; null if there are no shapes. */
-export function selectedShapeIndex(meant: SelectedShape | null, shapes: Shapes): number | null {
+export function selectedShapeIndex(selected: SelectedShape | null, shapes: Shapes): number | null {
   if (shapes.length === 0) return null;
-  return meant?.count === shapes.length ? meant.index : shapes.length - 1;
+  return selected?.count === shapes.length ? selected.index : shapes.length - 1;
 }
 
 /** Returns the shapes that an editor shows: none while a one-dimensional function is chosen. */
@@ -60,9 +60,9 @@ export function grabAt(
   shapes: Shapes,
   at: HistogramPoint,
   reach: HistogramPoint,
-  meant: number | null,
+  selected: number | null,
 ): Grab | null {
-  const hit = hitTest(shapes, at, reach, meant);
+  const hit = hitTest(shapes, at, reach, selected);
   return hit === null ? null : { ...hit, from: at, shape: shapes[hit.index] };
 }
 

@@ -15,7 +15,7 @@ const CONTENT: Content = {
   outline: () => cornersOf(MANIFEST.specimen.bounds_um),
   hasSurface: () => true,
   hasVolume: () => true,
-  objectsLeft: () => null,
+  shownObjectCount: () => null,
 };
 
 const each = (state: ViewerState, change: Partial<ViewerState["channels"][number]>) => ({
@@ -126,7 +126,7 @@ describe("an empty view", () => {
     const state = reduce(each(start, { hasObjects: true }), {
       ...{ type: "objects", channel: "c0", change: { only: [], hidden: [1] } },
     });
-    const content = { ...CONTENT, objectsLeft: () => 0 };
+    const content = { ...CONTENT, shownObjectCount: () => 0 };
     const next = after(state, emptyViewOf(state, content));
     expect([next.objects.c0.only, next.objects.c0.hidden]).toEqual([null, []]);
   });

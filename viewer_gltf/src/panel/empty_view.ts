@@ -25,7 +25,7 @@ export type Content = Readonly<{
   /** null: not known yet. */
   hasVolume: (channel: string, tile: string) => boolean | null;
   /** Number of objects of a label map that are shown; null: not known yet. */
-  objectsLeft: (channel: string) => number | null;
+  shownObjectCount: (channel: string) => number | null;
 }>;
 
 /** Returns null if something is visible, or if that is not known yet. */
@@ -157,9 +157,9 @@ const ALL_OBJECTS: Partial<ObjectView> = { hidden: [], only: null, ranges: {}, w
 function noObjects(
   { objects }: ViewerState,
   shown: readonly ChannelState[],
-  { objectsLeft }: Content,
+  { shownObjectCount }: Content,
 ): EmptyView | null {
-  if (!shown.every(({ id, hasObjects }) => hasObjects && objectsLeft(id) === 0)) return null;
+  if (!shown.every(({ id, hasObjects }) => hasObjects && shownObjectCount(id) === 0)) return null;
   const all = shown
     .filter(({ id }) => (objects[id] ?? START_OBJECTS) !== START_OBJECTS)
     .map(({ id }): Action => ({ type: "objects", channel: id, change: ALL_OBJECTS }));

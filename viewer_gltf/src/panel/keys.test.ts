@@ -265,24 +265,24 @@ describe("the keys", () => {
         const after = reduce(context.state, request);
         const text = spokenFeedback(request, context.state, after, new Map());
         const isSame = JSON.stringify(after) === JSON.stringify(context.state);
-        const isSaid =
+        const isAnnounced =
           "value" in request && typeof request.value !== "number"
             ? text !== ""
             : /: (at its limit|already so|the only one)$|^Slices: centred/.test(text);
-        if (isSame && !isSaid) {
+        if (isSame && !isAnnounced) {
           silent.push(`${where} ${name}: ${text}`);
         }
       }
     }
     expect(silent).toEqual([]);
     expect(KEYS.requestOf("}", contexts.bare)).toEqual({ refusal: NO_SLICES });
-    const said = (name: string) => {
+    const announced = (name: string) => {
       const request = KEYS.requestOf(name, contexts.atEnd);
       if (request === null || isRefusal(request)) throw new Error(name);
       return spokenFeedback(request, atEnd, atEnd, new Map());
     };
-    expect(said("}")).toBe("Slices: x 100.0 %: at its limit");
-    expect(said("D")).toBe("Focus disc 40°: at its limit");
+    expect(announced("}")).toBe("Slices: x 100.0 %: at its limit");
+    expect(announced("D")).toBe("Focus disc 40°: at its limit");
   });
 
   it("go to the next tile, also while one is isolated", () => {

@@ -57,7 +57,8 @@ const HUES = 24;
 
 /**
  * Returns eight colours that no other channel has: the colour-blind safe ones first, then the dyes,
- * then further hues. With many channels, the colours that are farthest from all others.
+ * then further hues. With many channels, it returns the
+ * colours that are farthest from all others.
  *
  * @param others colours of the other channels, #rrggbb
  */

@@ -23,7 +23,10 @@ export async function loadEnvironment(base: string, name: string): Promise<Envir
 }
 
 /** Loads the light of the stage's dome lights, which is a file of the bundle. Throws BundleError. */
-export async function loadStageRoom(base: string, file: FileRef): Promise<EnvironmentTables> {
+export async function loadStageEnvironment(
+  base: string,
+  file: FileRef,
+): Promise<EnvironmentTables> {
   const bytes = await fetchFile(base, file);
   return environmentTables(await parseExr(bytes, file.path));
 }

@@ -12,7 +12,7 @@ const OWN = "own";
 const STAGE = "stage";
 
 /** The bundle and the file that hold the image of a stage's domes. */
-export type StageRoom = Readonly<{ base: string; file: FileRef }>;
+export type StageEnvironment = Readonly<{ base: string; file: FileRef }>;
 
 export class EnvironmentLight {
   /** Name of the last requested environment; "": none. */
@@ -22,14 +22,14 @@ export class EnvironmentLight {
 
   constructor(
     /** The image of the stage's domes; null: it has none. */
-    private readonly stageRoom: StageRoom | null,
+    private readonly stageEnvironment: StageEnvironment | null,
     private readonly onTables: (tables: EnvironmentTables) => void,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {}
 
   /** Lights the scene by an environment, unless it is the current one. */
-  follow(name: string): void {
+  sync(name: string): void {
     if (name !== OWN && name !== this.name) void this.load(name);
   }
 
@@ -54,11 +54,11 @@ export class EnvironmentLight {
     this.hasFailed = false;
     this.isLoading = true;
     try {
-      const { loadEnvironment, loadStageRoom } = await loadLightReader();
-      const { stageRoom } = this;
+      const { loadEnvironment, loadStageEnvironment } = await loadLightReader();
+      const { stageEnvironment } = this;
       const tables =
-        name === STAGE && stageRoom !== null
-          ? await loadStageRoom(stageRoom.base, stageRoom.file)
+        name === STAGE && stageEnvironment !== null
+          ? await loadStageEnvironment(stageEnvironment.base, stageEnvironment.file)
           : await loadEnvironment(viewerAddress(), name);
       if (this.name === name) this.onTables(tables);
     } catch (error) {

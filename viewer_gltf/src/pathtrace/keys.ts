@@ -4,11 +4,11 @@ import { type Key, type KeyGroup, key, keysOf, neighbour, no, refusalOf } from "
 import { type NumberParameter, setTo, shareOf, valueAtShare } from "../state/parameters/kinds";
 import {
   AFTER,
+  ENVIRONMENT_ROWS,
   LAMP,
   LAMPS_SHOWN,
   LIGHT_NUMBERS,
   MEDIUM,
-  ROOM,
   TRACED_ALONE,
 } from "../state/parameters/light";
 import { STEREO_NUMBERS } from "../state/parameters/tools";
@@ -46,7 +46,7 @@ const KEYS: readonly Key[] = [
   key("X", "Choose the previous setting of path tracing or stereo", nextNumber(-1)),
   key("[", "Decrease the chosen setting of path tracing or stereo", changeBy(-1)),
   key("]", "Increase the chosen setting of path tracing or stereo", changeBy(1)),
-  ...[...MEDIUM, ...ROOM].flatMap(keysOf),
+  ...[...MEDIUM, ...ENVIRONMENT_ROWS].flatMap(keysOf),
   key("U", "Light from a .hdr or .exr file", ({ state }) =>
     isTraced(state) ? "own-light" : no(TRACED_ALONE),
   ),

@@ -1,6 +1,6 @@
 import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { GLOSS } from "../gpu/room_light";
+import { GLOSS } from "../gpu/scene_light";
 import { START_TRACE } from "../state/path_trace_settings";
 import { marchLight } from "../voxels/march_frame";
 import { environmentTables } from "./environment_sampling";

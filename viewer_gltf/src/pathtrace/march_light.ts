@@ -3,7 +3,7 @@
  * marching supports two lamps without shadows, a sky and a ground. LightProbe then matches the brightness.
  */
 import type { Matrix4, Vector3 } from "three";
-import { asOneLamp, GLOSS } from "../gpu/room_light";
+import { asOneLamp, GLOSS } from "../gpu/scene_light";
 import type { Rgb } from "../math/color";
 import { type Lamp, MEDIUM_NUMBERS, type TraceSettings } from "../state/path_trace_settings";
 import type { MarchLight } from "../voxels/march_frame";

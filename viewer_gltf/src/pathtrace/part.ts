@@ -27,7 +27,7 @@ class PathTracePart implements Part, Form {
     const { sceneDepth } = host.frame;
     const { base, manifest } = host.bundle;
     const image = manifest.lights?.room?.image;
-    const stageRoom = image === undefined ? null : { base, file: image };
+    const stageEnvironment = image === undefined ? null : { base, file: image };
     const onChange = () => host.display.requestFrame();
     const onError = (error: unknown) => host.report(error);
     const { bricks, limits } = texels;
@@ -36,7 +36,7 @@ class PathTracePart implements Part, Form {
       bricks,
       limits,
       sceneDepth,
-      stageRoom,
+      stageEnvironment,
       onChange,
       onError,
     );
@@ -48,12 +48,12 @@ class PathTracePart implements Part, Form {
   }
 
   sync(state: ViewerState): void {
-    this.volume?.follow(state);
+    this.volume?.sync(state);
   }
 
   panel(view: PanelView): readonly PartSection[] {
-    const { state, isInRoom } = this.host;
-    return lightSections(state, view, isInRoom);
+    const { state, isInStereo } = this.host;
+    return lightSections(state, view, isInStereo);
   }
 
   get isLoading(): boolean {

@@ -5,7 +5,7 @@
 import type { Matrix4, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { Eyes } from "../gpu/eyes";
-import { OWN_LIGHT } from "../gpu/room_light";
+import { OWN_LIGHT } from "../gpu/scene_light";
 import { ScreenPass } from "../gpu/screen_pass";
 import type { MarchedFrame, TraceScene } from "../render/drawn_forms";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
@@ -60,7 +60,7 @@ const STOOD_IN = 5;
 export class Tracer {
   private readonly probe = new LightProbe();
   private readonly denoiseAndTone = new DenoiseAndTone(this.probe);
-  private roomLight: readonly [number, number, number] = [0, 0, 0];
+  private environmentLight: readonly [number, number, number] = [0, 0, 0];
   private hemispheres: Hemispheres = OWN_LIGHT;
   private texels: MediumTexels | null = null;
   /** The views from which paths begin. They stay fixed as long as the eyes only tremble. */
@@ -158,7 +158,7 @@ export class Tracer {
   }
 
   lightBy(tables: EnvironmentTables): void {
-    this.roomLight = tables.mean;
+    this.environmentLight = tables.mean;
     this.hemispheres = hemispheresOf(tables);
     this.textures.lightBy(tables);
     this.restart();
@@ -249,7 +249,7 @@ export class Tracer {
     if (this.texels === null) return;
     const box = this.boxMatrix(scene.specimen);
     const { uniforms } = this.pathPass;
-    sceneInto(uniforms, scene, this.texels.frame, box, settings, isDraft, this.roomLight);
+    sceneInto(uniforms, scene, this.texels.frame, box, settings, isDraft, this.environmentLight);
     const matter = matterOf(scene);
     if (matter !== this.matter) this.restart();
     this.matter = matter;

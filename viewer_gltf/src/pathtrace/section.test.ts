@@ -22,9 +22,9 @@ function find<K extends Control["kind"]>(state: ViewerState, kind: K, id: string
   if (found?.kind !== kind) throw new Error(`no ${kind} ${id}`);
   return found as Extract<Control, { kind: K }>;
 }
-function granted(state: ViewerState, wish: Request): ViewerState {
-  if (typeof wish === "string" || "panel" in wish) throw new Error("no action");
-  return reduce(state, wish);
+function granted(state: ViewerState, request: Request): ViewerState {
+  if (typeof request === "string" || "panel" in request) throw new Error("no action");
+  return reduce(state, request);
 }
 
 describe("the panel's section for path tracing", () => {
@@ -96,8 +96,8 @@ describe("the panel's section for path tracing", () => {
 
   it("has the same controls in stereo, except for the file", () => {
     const ids = (isStereo: boolean) => controlsOf(TRACED, isStereo).map(({ id }) => id);
-    const [onScreen, inRoom] = [ids(false), ids(true)];
-    expect(onScreen.filter((id) => !inRoom.includes(id))).toEqual(["trace", "own-light"]);
-    expect(inRoom).toContain("trace/lamps");
+    const [onScreen, inStereo] = [ids(false), ids(true)];
+    expect(onScreen.filter((id) => !inStereo.includes(id))).toEqual(["trace", "own-light"]);
+    expect(inStereo).toContain("trace/lamps");
   });
 });

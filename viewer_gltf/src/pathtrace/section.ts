@@ -5,11 +5,11 @@ import type { Button, Group, PanelView, PartSection, Section } from "../panel/co
 import { setTo } from "../state/parameters/kinds";
 import {
   AFTER,
+  ENVIRONMENT_ROWS,
   LAMP,
   LAMPS_SHOWN,
   type LampParameters,
   MEDIUM,
-  ROOM,
   TRACED_ALONE,
 } from "../state/parameters/light";
 import { isTraced, MODE } from "../state/parameters/volumes";
@@ -66,7 +66,7 @@ function settingsOf(
   return [
     ...controlsOf(MEDIUM, state),
     ...ownLight,
-    ...controlsOf(ROOM, state),
+    ...controlsOf(ENVIRONMENT_ROWS, state),
     controlOf(LAMPS_SHOWN, state),
     ...LAMP.map((lamp) => lampGroup(lamp, state, view)),
     ...controlsOf(AFTER, state),

@@ -12,7 +12,7 @@ import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import type { BrickService } from "../voxels/bricks/brick_service";
 import type { MarchLight } from "../voxels/march_frame";
 import type { VolumeLimits } from "../voxels/mip_levels";
-import { EnvironmentLight, PATHS_NOT_LOADED, type StageRoom } from "./environment_light";
+import { EnvironmentLight, PATHS_NOT_LOADED, type StageEnvironment } from "./environment_light";
 import type { EnvironmentTables } from "./environment_sampling";
 import { MediumChanges } from "./medium_changes";
 import type { MediumTexels } from "./medium_loader";
@@ -45,7 +45,7 @@ export class TracedVolume implements TracedVolumes {
     bricks: BrickService | null,
     private limits: VolumeLimits,
     private readonly sceneDepth: { value: Texture },
-    stageRoom: StageRoom | null,
+    stageEnvironment: StageEnvironment | null,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
   ) {
@@ -53,13 +53,13 @@ export class TracedVolume implements TracedVolumes {
       onTexels: (texels) => this.take(texels),
       onRefused: () => {
         this.drop();
-        if (this.state !== null) this.follow(this.state);
+        if (this.state !== null) this.sync(this.state);
       },
       onChange,
       onError: (error) => this.fail(error),
     });
     const lightBy = (tables: EnvironmentTables) => this.tracer?.lightBy(tables);
-    this.environment = new EnvironmentLight(stageRoom, lightBy, onChange, onError);
+    this.environment = new EnvironmentLight(stageEnvironment, lightBy, onChange, onError);
   }
 
   get isLoading(): boolean {
@@ -98,7 +98,7 @@ export class TracedVolume implements TracedVolumes {
     return this.medium.shown(tables, state.isolated);
   }
 
-  follow(state: ViewerState): void {
+  sync(state: ViewerState): void {
     this.state = state;
     if (!isTraced(state)) {
       this.drop();
@@ -116,7 +116,7 @@ export class TracedVolume implements TracedVolumes {
       this.wanted = wanted;
       if (channels.length > 0) void this.medium.load({ channels, tiles }, this.limits);
     }
-    this.environment.follow(state.trace.environment);
+    this.environment.sync(state.trace.environment);
     this.setAppearances();
   }
 
@@ -126,7 +126,7 @@ export class TracedVolume implements TracedVolumes {
     await this.environment.lightBy(file);
   }
 
-  /** Limits the texture's edge, in texels, from the next `follow` on. */
+  /** Limits the texture's edge, in texels, from the next `sync` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
     this.drop();
@@ -213,7 +213,7 @@ export class TracedVolume implements TracedVolumes {
           isEncoded: true,
         });
         this.group.add(this.overlay.mesh);
-        if (this.state !== null) this.follow(this.state);
+        if (this.state !== null) this.sync(this.state);
         this.onChange();
         return tracer;
       });

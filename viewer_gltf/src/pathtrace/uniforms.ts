@@ -74,7 +74,7 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
     uToBox: { value: new Matrix4() },
     uSceneToBox: { value: new Matrix4() },
     uEyeAt: { value: new Vector3() },
-    uToRoom: { value: new Matrix3() },
+    uToEnvironment: { value: new Matrix3() },
     uEye: { value: new Vector4(0, 0, 1, 1) },
     uSceneDepth,
     uEnvironment: nothing(),
@@ -128,7 +128,7 @@ export function texelsInto(uniforms: TraceUniforms, { frame, texture, index, siz
 
 /**
  * @param box from um of the box to the scene
- * @param roomLight mean radiance of the environment
+ * @param environmentLight mean radiance of the environment
  */
 export function sceneInto(
   uniforms: TraceUniforms,
@@ -137,19 +137,19 @@ export function sceneInto(
   box: Matrix4,
   settings: TraceSettings,
   isDraft: boolean,
-  roomLight: readonly [number, number, number],
+  environmentLight: readonly [number, number, number],
 ): void {
   const toWorld = boxToWorld(frame);
   const toBox = toWorld.clone().invert();
   clipInto(clip, toWorld, toBox, uniforms);
   const turn = new Matrix4().makeRotationY((settings.environmentTurn_deg * Math.PI) / 180);
-  uniforms.uToRoom.value.copy(turnOf(turn.multiply(box)));
+  uniforms.uToEnvironment.value.copy(turnOf(turn.multiply(box)));
   uniforms.uEnvironmentLight.value = settings.environmentLight;
   uniforms.uMostLight.value = isDraft ? MAX_LIGHT_MOVING : MAX_LIGHT;
   const most = isDraft ? FEW_SCATTERS : MAX_SCATTERS;
   uniforms.uScatters.value = settings.isMultiple ? most : 1;
   const beyond = settings.isMultiple && isDraft ? settings.environmentLight : 0;
-  uniforms.uBeyond.value.set(...roomLight).multiplyScalar(beyond);
+  uniforms.uBeyond.value.set(...environmentLight).multiplyScalar(beyond);
   const { steps } = settings;
   uniforms.uStride.value = steps > 0 ? uniforms.uSize.value.length() / Math.max(1, steps) : 0;
   uniforms.uAnisotropy.value = settings.anisotropy;

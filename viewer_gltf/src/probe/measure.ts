@@ -27,7 +27,7 @@ const RIM = 1e-6;
 export function measurementText(kind: MeasureKind, points: readonly Vec3[]): string {
   if (kind === "angle") {
     const angle = angleOf(points);
-    return angle === null ? "two of its points are one" : `${angle.toFixed(1)}°`;
+    return angle === null ? "two points coincide" : `${angle.toFixed(1)}°`;
   }
   const length = distanceText(lengthOf(points));
   return kind === "line" ? `${length}, ${points.length} points` : length;

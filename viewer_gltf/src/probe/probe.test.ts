@@ -22,7 +22,7 @@ const TILES = [
 ];
 const FRONT: Ray = { origin: [50, -50, 1000], direction: [0, 0, -1] };
 /** From um to the scene: the specimen is turned, small and off-centre. */
-const ROOM = new Matrix4()
+const FROM_UM_TO_SCENE = new Matrix4()
   .makeTranslation(0.3, 1.4, -1)
   .multiply(new Matrix4().makeRotationY(0.7))
   .multiply(new Matrix4().makeScale(0.004, 0.004, 0.004));
@@ -34,7 +34,7 @@ function solid(min: Vector3, max: Vector3, channel: string): ShownSurface {
   const geometry = new BoxGeometry(...size.toArray()).translate(...middle.toArray());
   const mesh = new Mesh(geometry, new MeshBasicMaterial({ side: DoubleSide }));
   mesh.matrixAutoUpdate = false;
-  mesh.matrixWorld.copy(ROOM);
+  mesh.matrixWorld.copy(FROM_UM_TO_SCENE);
   return { mesh, tile: "r0_c0", channel };
 }
 
@@ -47,7 +47,8 @@ function expectNear(found: readonly number[] | undefined, expected: readonly num
 describe("a ray at surfaces", () => {
   const near = solid(new Vector3(20, -80, 60), new Vector3(80, -20, 90), "near");
   const far = solid(new Vector3(20, -80, 10), new Vector3(80, -20, 40), "far");
-  const probe = (clip: Clip, ray = FRONT) => probeSurfaces(ray, [far, near], ROOM, clip, TILES);
+  const probe = (clip: Clip, ray = FRONT) =>
+    probeSurfaces(ray, [far, near], FROM_UM_TO_SCENE, clip, TILES);
 
   it("meets the nearest one, in um", () => {
     const found = probe(NO_CLIP);

@@ -208,8 +208,8 @@ function isInCone(point: Vec3, { apex_um, axis_um, cosine }: Cone): boolean {
 
 /** Returns the place where the ray enters the first tile that is not cut away there. */
 export function probeBoxes(ray: Ray, tiles: readonly BoxedTile[], clip: Clip): Probed | null {
-  const met = pickTile(ray, tiles, clip);
-  if (met === null) return null;
-  const { id, distance } = met;
+  const entered = pickTile(ray, tiles, clip);
+  if (entered === null) return null;
+  const { id, distance } = entered;
   return { point: pointOn(ray, distance), tile: id, channel: null, distance_um: distance };
 }

@@ -22,7 +22,7 @@ import {
   tileAt,
   unitRay,
 } from "./probe";
-import { levelAtHand, TexelCache } from "./texel_cache";
+import { availableLevel, TexelCache } from "./texel_cache";
 
 /** Largest number of texels of the level in which the reader looks for a ray's hit. */
 const PROBED_TEXELS = 2 * 1024 * 1024;
@@ -73,9 +73,9 @@ export class Reading {
     const disc = mode === "disc" ? this.disc : null;
     const volume = probeVolumes(along, await this.volumesAlong(along), clip, disc);
     const other = this.options.pick?.(along) ?? null;
-    const met = [surface, volume, other].filter((each) => each !== null);
-    if (met.length === 0) return null;
-    return met.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
+    const hits = [surface, volume, other].filter((each) => each !== null);
+    if (hits.length === 0) return null;
+    return hits.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
   }
 
   /** Returns a hit at once: of a surface, otherwise of a tile's box. Volumes are ignored. */
@@ -119,7 +119,7 @@ export class Reading {
       const tile = this.tileAt(point);
       return this.shownChannels.map(({ id }) => {
         const source = this.options.source(tile, id);
-        return `${id} ${source && levelAtHand(source)}`;
+        return `${id} ${source && availableLevel(source)}`;
       });
     });
     return known.join();
@@ -142,11 +142,11 @@ export class Reading {
 
   private async volumesAlong(along: Ray): Promise<readonly ProbedVolume[]> {
     const clip = this.clipFor(along);
-    const met = this.tiles.filter((tile) => pickTile(along, [tile], clip) !== null);
+    const crossed = this.tiles.filter((tile) => pickTile(along, [tile], clip) !== null);
     const found: ProbedVolume[] = [];
     for (const { source, ...shown } of this.options.volumes()) {
-      if (!met.some(({ id }) => id === shown.tile)) continue;
-      const level = await this.orReport(this.cache.atHand(source, PROBED_TEXELS));
+      if (!crossed.some(({ id }) => id === shown.tile)) continue;
+      const level = await this.orReport(this.cache.available(source, PROBED_TEXELS));
       if (level !== null) found.push({ ...shown, volume: source.volume, level });
     }
     return found;

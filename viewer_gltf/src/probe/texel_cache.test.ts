@@ -2,7 +2,7 @@ import { beforeEach, expect, it, vi } from "vitest";
 import { decodeTexels } from "../bundle/decode";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { LevelSource } from "../state/on_screen";
-import { levelAtHand, TexelCache } from "./texel_cache";
+import { availableLevel, TexelCache } from "./texel_cache";
 
 vi.mock("../bundle/decode", () => ({
   decodeTexels: vi.fn(async (frames: readonly { bytes: Uint8Array }[], bytes: number) =>
@@ -32,10 +32,10 @@ function volumeOf(name: string, sides: readonly number[]): TileVolume {
   };
 }
 
-function sourceOf(volume: TileVolume, atHand: readonly number[]): LevelSource {
+function sourceOf(volume: TileVolume, available: readonly number[]): LevelSource {
   return {
     volume,
-    has: (index) => atHand.includes(index),
+    has: (index) => available.includes(index),
     level: async (index) => Uint8Array.of(index),
   };
 }
@@ -48,12 +48,12 @@ beforeEach(() => {
 
 it("takes the finest available level that is small enough", async () => {
   const source = sourceOf(volumeOf("a", [64, 32, 16]), [2, 1]);
-  expect(levelAtHand(source)).toBe(1);
-  expect(levelAtHand(source, 5000)).toBe(2);
-  expect(levelAtHand(source, 5)).toBeNull();
+  expect(availableLevel(source)).toBe(1);
+  expect(availableLevel(source, 5000)).toBe(2);
+  expect(availableLevel(source, 5)).toBeNull();
   const cache = new TexelCache(reopen);
-  expect((await cache.atHand(source))?.size).toEqual([32, 32, 32]);
-  expect(await cache.atHand(source, 5)).toBeNull();
+  expect((await cache.available(source))?.size).toEqual([32, 32, 32]);
+  expect(await cache.available(source, 5)).toBeNull();
   expect(decodeTexels).toHaveBeenCalledTimes(1);
 });
 

@@ -17,7 +17,10 @@ const FETCHED_TEXELS = 4 * 1024 * 1024;
 type Kept = Readonly<{ bytes: number; level: Promise<VolumeLevel> }>;
 
 /** Returns the finest available level of at most `most` texels; null if there is none. */
-export function levelAtHand(source: LevelSource, most = Number.POSITIVE_INFINITY): number | null {
+export function availableLevel(
+  source: LevelSource,
+  most = Number.POSITIVE_INFINITY,
+): number | null {
   const { levels } = source.volume;
   const index = levels.findIndex((level, i) => source.has(i) && texels(level) <= most);
   return index === -1 ? null : index;
@@ -31,14 +34,14 @@ export class TexelCache {
   constructor(private readonly reopen: (volume: TileVolume) => LevelSource) {}
 
   /** Returns the finest available level of at most `most` texels; null if there is none. Throws BundleError. */
-  async atHand(source: LevelSource, most?: number): Promise<VolumeLevel | null> {
-    const index = levelAtHand(source, most);
+  async available(source: LevelSource, most?: number): Promise<VolumeLevel | null> {
+    const index = availableLevel(source, most);
     return index === null ? null : this.decoded(source, index);
   }
 
   /** Returns the finest available level; fetches one if there is none. Throws BundleError, AbortError. */
   async best(source: LevelSource): Promise<VolumeLevel> {
-    const index = levelAtHand(source);
+    const index = availableLevel(source);
     if (index !== null) return this.decoded(source, index);
     const { levels } = source.volume;
     const order = levelsToFetch(levels, FETCHED_TEXELS, Number.POSITIVE_INFINITY);

@@ -79,7 +79,7 @@ export type SurfacePart = Readonly<{
 
 export type Share = Readonly<{
   opacity: number;
-  /** Share that its volume takes, 0 to 1: in the disc, or everywhere. */
+  /** Share of the surface that the channel's volume replaces, 0 to 1: in the disc, or everywhere. */
   taken: number;
   isInDisc: boolean;
   /** Whether surfaces and volumes are mixed across the disc's rim. */

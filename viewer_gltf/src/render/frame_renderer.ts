@@ -20,14 +20,14 @@ import { Eyes } from "../gpu/eyes";
 import { drawWhole } from "../gpu/float_targets";
 import { linearTarget } from "../gpu/linear_target";
 import type { Clip } from "../math/clip";
-import { lightByRoom, makeFrame, REST_STEPS } from "../voxels/march_frame";
+import { lightByScene, makeFrame, REST_STEPS } from "../voxels/march_frame";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "./blend_material";
 import { CrossFade } from "./cross_fade";
 import { DepthPass } from "./depth_pass";
 import type { MarchedVolumes, TracedVolumes } from "./drawn_forms";
 import type { GazeFocus } from "./gaze_focus";
 import { MarchPass } from "./raymarch_pass";
-import type { Room } from "./scene";
+import type { SpecimenScene } from "./specimen_scene";
 
 export type Drawn = Readonly<{
   /** Null if no part draws volumes. */
@@ -114,7 +114,7 @@ export class FrameRenderer {
 
   constructor(
     private readonly renderer: WebGLRenderer,
-    private readonly room: Room,
+    private readonly specimenScene: SpecimenScene,
     private readonly gazeFocus: GazeFocus,
   ) {
     const { uDisc, uIsCrossing } = this.marchFrame;
@@ -130,7 +130,7 @@ export class FrameRenderer {
     const whole = { ...disc, uIsCrossing: { value: true } };
     this.overWithin = new Overlay(this.within.texture, uSceneDepth, { order: LAST, disc: whole });
     this.mixed.add(this.overWithin.mesh);
-    room.scene.add(...this.march.overlays, ...this.marchWithin.overlays);
+    specimenScene.scene.add(...this.march.overlays, ...this.marchWithin.overlays);
   }
 
   /**
@@ -146,15 +146,15 @@ export class FrameRenderer {
     clip: Clip,
     { resolution, isMoving, passes, isSmooth, gathers }: FramePace,
   ): void {
-    const { renderer, room, gazeFocus } = this;
+    const { renderer, specimenScene, gazeFocus } = this;
     const { volumes, traced, panes, overlays, bounds, solids } = drawn;
     const marches = volumes?.marches ?? null;
-    const specimen = room.specimen.group.matrixWorld;
+    const specimen = specimenScene.specimen.group.matrixWorld;
     renderer.info.reset();
-    room.aimLamps(head);
-    room.isFlat = this.eyes.all.length === 1;
-    this.both.prepare(room.scene);
-    this.cuts.follow(clip, specimen);
+    specimenScene.aimLamps(head);
+    specimenScene.isFlat = this.eyes.all.length === 1;
+    this.both.prepare(specimenScene.scene);
+    this.cuts.sync(clip, specimen);
     this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
     this.marchFrame.uIsCrossing.value = marches?.isInDisc ?? false;
@@ -162,8 +162,8 @@ export class FrameRenderer {
     this.marchWithin.hide();
     traced?.hide();
     const opaque = (blended = panes) =>
-      this.depth.render(renderer, room.scene, this.eyes, [
-        ...room.overlays,
+      this.depth.render(renderer, specimenScene.scene, this.eyes, [
+        ...specimenScene.overlays,
         ...overlays,
         ...blended.map(({ scene }) => scene),
       ]);
@@ -177,11 +177,11 @@ export class FrameRenderer {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
       marches.placeAs(specimen);
-      const axes = room.lampAxes(head);
-      const lamp = this.lamp.set(...room.light.key.towards).transformDirection(axes);
+      const axes = specimenScene.lampAxes(head);
+      const lamp = this.lamp.set(...specimenScene.light.key.towards).transformDirection(axes);
       lamp.transformDirection(toSpecimen);
       const toEye = this.toEye.copy(head).invert().multiply(axes);
-      if (tracer === null) lightByRoom(this.marchFrame, room.light, toEye);
+      if (tracer === null) lightByScene(this.marchFrame, specimenScene.light, toEye);
       else tracer.lightMarch(this.marchFrame, specimen, head);
       const { apex_um: apex, axis_um: axis } = gazeFocus;
       volumes?.aim({ eye, apex, axis, clip: this.cuts.march, lamp });
@@ -189,7 +189,7 @@ export class FrameRenderer {
       const marchBy = (pass: MarchPass, blended = panes) => {
         const hasPane = blended.some(({ isPane }) => isPane);
         this.marchFrame.uHasPane.value = hasPane;
-        if (hasPane) this.depth.renderPanes(renderer, room.scene, this.eyes);
+        if (hasPane) this.depth.renderPanes(renderer, specimenScene.scene, this.eyes);
         pass.render(marches.scene, this.eyes, resolution, gathers);
       };
       if (isMixed) {
@@ -219,7 +219,7 @@ export class FrameRenderer {
 
   /** Whether the user's own room is visible behind the specimen. */
   set isSeeThrough(is: boolean) {
-    this.room.isSeeThrough = is;
+    this.specimenScene.isSeeThrough = is;
     this.encode.isSeeThrough = is;
   }
 
@@ -259,7 +259,7 @@ export class FrameRenderer {
   }
 
   private aim({ min, max }: Bounds, resolution: number): void {
-    const { gazeFocus, cone, marchFrame, room } = this;
+    const { gazeFocus, cone, marchFrame, specimenScene } = this;
     cone.uApex.value.copy(gazeFocus.apex);
     cone.uAxis.value.copy(gazeFocus.axis);
     const middle = this.point
@@ -267,7 +267,7 @@ export class FrameRenderer {
       .add(this.corner.set(...min))
       .multiplyScalar(0.5);
     cone.uRim.value = middle
-      .applyMatrix4(room.specimen.group.matrixWorld)
+      .applyMatrix4(specimenScene.specimen.group.matrixWorld)
       .distanceTo(gazeFocus.apex);
     marchFrame.uDisc.value.set(...gazeFocus.cosines);
     const [eye] = this.eyes.all;
@@ -305,7 +305,7 @@ export class FrameRenderer {
     light.setSize(eyes.width_px, eyes.height_px);
     renderer.xr.enabled = false;
     renderer.setRenderTarget(light);
-    renderer.render(this.room.scene, both.cameraOf(eyes));
+    renderer.render(this.specimenScene.scene, both.cameraOf(eyes));
     renderer.xr.enabled = enabled;
     return before;
   }
@@ -316,7 +316,7 @@ export class FrameRenderer {
   }
 
   add(overlay: Object3D): void {
-    this.room.scene.add(overlay);
+    this.specimenScene.scene.add(overlay);
   }
 
   dispose(): void {

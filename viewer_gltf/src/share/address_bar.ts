@@ -52,7 +52,7 @@ export class AddressBar {
   ) {
     const { hash } = location;
     // A page that was reloaded in the split screen is still at that step of the history, but no longer split.
-    if (!host.isInRoom && isPassingStep()) history.replaceState(null, "");
+    if (!host.isInStereo && isPassingStep()) history.replaceState(null, "");
     this.seen = this.now;
     this.written = { state, camera: HAS_CAMERA.test(hash) ? camera : null };
     this.opening = { link: this.linkTo(this.written), hash };
@@ -61,7 +61,7 @@ export class AddressBar {
   /** Updates the address at once, for example before a reload. */
   write(): void {
     const { now } = this;
-    if (this.host.isInRoom || isPassingStep() || !isOwnAddress()) return;
+    if (this.host.isInStereo || isPassingStep() || !isOwnAddress()) return;
     this.written = now;
     const link = this.linkTo(now);
     const isOpening = link === this.opening.link;

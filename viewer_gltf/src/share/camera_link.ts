@@ -10,7 +10,7 @@ const FARTHEST_M = 100;
 const NEAREST_M = 1e-4;
 
 /** Returns the parameter `eye`, and `pose` if the specimen was moved. */
-export function writeLook({ position, target, specimen }: CameraView): Record<string, string> {
+export function writeCamera({ position, target, specimen }: CameraView): Record<string, string> {
   const eye = written([...position, ...target]);
   if (specimen === null) return { eye };
   const pose = written([...specimen.position, ...specimen.orientation, specimen.scale]);
@@ -18,13 +18,13 @@ export function writeLook({ position, target, specimen }: CameraView): Record<st
 }
 
 /** Reads a camera; null if it can't be read, or would not show anything. */
-export function readLook(eye: string, pose: string | null): CameraView | null {
+export function readCamera(eye: string, pose: string | null): CameraView | null {
   const camera = readNumbers(eye, 6);
   const specimen = pose === null ? null : readSpecimen(pose);
   if (camera === null || (pose !== null && specimen === null)) return null;
   const [px, py, pz, tx, ty, tz] = camera;
   const isBlind = Math.hypot(px - tx, py - ty, pz - tz) < NEAREST_M;
-  if (isBlind || !areInRoom(camera)) return null;
+  if (isBlind || !areInScene(camera)) return null;
   return { position: [px, py, pz], target: [tx, ty, tz], specimen };
 }
 
@@ -33,7 +33,7 @@ function readSpecimen(pose: string): SpecimenPlacement | null {
   if (values === null) return null;
   const [x, y, z, qx, qy, qz, qw, size] = values;
   const length = Math.hypot(qx, qy, qz, qw);
-  if (!(length > 0.5) || !(size > 0) || !areInRoom([x, y, z])) return null;
+  if (!(length > 0.5) || !(size > 0) || !areInScene([x, y, z])) return null;
   return {
     position: [x, y, z],
     orientation: [qx / length, qy / length, qz / length, qw / length],
@@ -41,6 +41,6 @@ function readSpecimen(pose: string): SpecimenPlacement | null {
   };
 }
 
-function areInRoom(values: readonly number[]): boolean {
+function areInScene(values: readonly number[]): boolean {
   return values.every((value) => Math.abs(value) <= FARTHEST_M);
 }

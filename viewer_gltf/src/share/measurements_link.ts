@@ -19,7 +19,7 @@ const LETTERS: readonly (readonly [string, MeasureKind])[] = [
   ["l", "line"],
 ];
 
-/** Returns the list as text. An unfinished measurement or a new distance is not in it: its points are returned, too. */
+/** Returns the list as text, and the points of an unfinished measurement or a new distance, which the list leaves out. */
 export function linkedMeasurements(state: Measuring): readonly [string, readonly Vec3[]] {
   const { measured, measuredAs, measureKind, measurements } = state;
   const isDone = missing(measuredAs, measured) === 0;

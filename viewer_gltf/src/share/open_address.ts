@@ -32,22 +32,22 @@ export function openAddress(host: PartHost, search: string, readLink: LinkReader
   const { actions, camera } = readLink(host.state, bounds_um);
   const asked = [...settingsOf(search), ...actions];
   for (const action of asked) host.dispatch(action);
-  const saysDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
+  const hasDistance = asked.some((a) => a.type === "set" && a.id === SWITCH_DISTANCE.id);
   const stand = standOf(search); // the viewpoint to which `reset` returns, also if a link opens another one
   host.display.fit(); // the panel has been laid out by now
   if (stand !== null) viewpoint.openAt(stand);
-  else if (camera === null) openSlowly(host, saysDistance);
+  else if (camera === null) openSlowly(host, hasDistance);
   if (camera !== null) viewpoint.lookFrom(camera);
   host.panel.show({ channelsWithCard: null });
   host.undo.forget();
 }
 
 /** Shows the whole specimen, near enough for volumes to show, and turns it slowly until a user touches it. */
-function openSlowly(host: PartHost, saysDistance: boolean): void {
+function openSlowly(host: PartHost, hasDistance: boolean): void {
   const { viewpoint } = host;
   const away_m = NEAR_AT_START * viewpoint.openingDistance_m;
   const isFar = away_m > host.state.switchDistance_m;
-  if (isFar && !saysDistance) host.dispatch(setTo(SWITCH_DISTANCE, away_m));
+  if (isFar && !hasDistance) host.dispatch(setTo(SWITCH_DISTANCE, away_m));
   // The path tracer gathers light only while nothing moves.
   const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
   if (!isCalm && !isTraced(host.state)) viewpoint.turnSlowly();

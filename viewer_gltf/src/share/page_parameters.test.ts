@@ -33,10 +33,10 @@ describe("the page's address", () => {
     expect(settingsOf("?mode=cube&switch=&disc=wide")).toEqual([
       {
         type: "notify",
-        text: "address: mode: expected one of disc, tile, all, stage, traced, off, found cube",
+        text: "Address: mode is cube, expected one of disc, tile, all, stage, traced, off",
       },
-      { type: "notify", text: "address: switch: expected a number, found " },
-      { type: "notify", text: "address: disc: expected a number, found wide" },
+      { type: "notify", text: "Address: switch is empty, expected a number" },
+      { type: "notify", text: "Address: disc is wide, expected a number" },
     ]);
   });
 });

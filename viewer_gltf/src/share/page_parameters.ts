@@ -1,7 +1,15 @@
 /**
- * Reads the settings in the page's address: `mode` (disc, tile, all, stage, traced, off), `quality` (auto, low,
- * high), `switch` (metres of the scene), `disc` (degrees), `stereo` (off, anaglyph, side-by-side), `view` (front,
- * side, top), `panel` (off), `theme` (light, dark), `backdrop` (plain). Pure.
+ * Reads the settings in the page's address. Pure.
+ *
+ * - `mode`: disc, tile, all, stage, traced or off
+ * - `quality`: auto, low or high
+ * - `switch`: volume distance, m of the scene
+ * - `disc`: radius of the focus disc, degrees
+ * - `stereo`: off, anaglyph or side-by-side
+ * - `view`: front, side or top
+ * - `panel`: off
+ * - `theme`: light or dark
+ * - `backdrop`: plain
  */
 import { NAMED_VIEWS, type NamedView } from "../interaction/named_views";
 import type { Action } from "../state/actions";
@@ -54,6 +62,11 @@ export function settingsOf(search: string): readonly Action[] {
     const value = valueIn(row, text);
     if (value !== null) return [setTo<Value>(row, value)];
     const expected = row.kind === "choice" ? `one of ${row.values.join(", ")}` : "a number";
-    return [{ type: "notify", text: `address: ${name}: expected ${expected}, found ${text}` }];
+    return [
+      {
+        type: "notify",
+        text: `Address: ${name} is ${text === "" ? "empty" : text}, expected ${expected}`,
+      },
+    ];
   });
 }

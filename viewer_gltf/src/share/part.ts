@@ -76,14 +76,16 @@ class SharePart implements Part, Links {
     const but =
       without === 0
         ? ""
-        : ` It leaves out lists of ${without} objects, which are too long: save them as CSV.`;
-    if (host.isInRoom) {
-      host.announce(`The link is in the page's address, for when you leave.${but}`);
+        : ` The link leaves out ${without} objects, because their lists are too long. Save them as CSV.`;
+    if (host.isInStereo) {
+      host.announce(`The link is in the page's address. Copy it after you leave stereo.${but}`);
     } else if (await copyText(address.href)) {
       host.announce(`The link is in the clipboard.${but}`);
     } else {
       host.service("page")?.focus("share", "link"); // focusing the field selects the link
-      host.announce(`Here is the link, selected: copy it by Ctrl+C, or by a long press.${but}`);
+      host.announce(
+        `The link is selected in the panel. Copy it with Ctrl+C or a long press.${but}`,
+      );
     }
   }
 

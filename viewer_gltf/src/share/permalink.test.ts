@@ -191,7 +191,9 @@ describe("a link to a view", () => {
   });
 
   it("is only reported if a newer viewer wrote it, or no viewer", () => {
-    expect(noticesOf("#v=2&disc=20")).toEqual(["Link: this viewer reads version 1, found 2."]);
+    expect(noticesOf("#v=2&disc=20")).toEqual([
+      "Link: v is 2, expected 1: open the link with the viewer that wrote it.",
+    ]);
     expect(noticesOf("#section-3")).toHaveLength(1);
     expect(opened("#v=2&disc=20").discRadius_deg).toBe(start().discRadius_deg);
     expect(read("")).toEqual({ actions: [], camera: null });
@@ -226,7 +228,7 @@ describe("a link to a view", () => {
     ["#v=1&l=c0:c12345", "l c0:c12345"],
     ["#v=1&l=c0:tevil", "l c0:tevil"],
   ])("%s is reported and left out", (hash, named) => {
-    expect(noticesOf(hash)).toEqual([`Link: left out what can't be read: ${named}.`]);
+    expect(noticesOf(hash)).toEqual([`Link: left out parts that can't be read: ${named}.`]);
     const { notices, ...state } = opened(hash);
     const { notices: _, ...opening } = start();
     expect(state).toEqual(opening);

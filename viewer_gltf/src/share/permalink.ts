@@ -3,13 +3,37 @@
  *
  *   #v=1&c=DAPI,CD8&l=DAPI:c3050ff:o0.5,CD8:n&mode=tile&eye=0,0,1.8,0,0,0
  *
- * A link contains only differences from the state in which the bundle opens. `c`: the channels shown; `l`: channels
- * with a changed appearance, each with c(olour, sRGB) o(pacity) w(indow, low_high) s(hapes of a transfer function,
- * name_shapes: see shapes_link.ts) t(ransfer function) n(o volume).
- * Others: mode, switch (m), disc (degrees), tile, only (the isolated tile), box (um, low and high
- * corner), cut (a plane's normal and offset; none: the opening cut is removed), points (um), measures (see
- * measurements_link.ts), views (saved ones, in the form of eye), objects (of label maps: see objects/linked.ts), tool,
- * dwell, quality, light (see path_trace_link.ts), lamps (shown or not), eye and pose.
+ * A link contains only differences from the state in which the bundle opens:
+ *
+ * - `v`: version of the link
+ * - `c`: the channels shown
+ * - `l`: the channels with a changed appearance, and the letters below for each
+ * - `mode`: where volumes are drawn
+ * - `switch`: volume distance, m of the scene
+ * - `disc`: radius of the focus disc, degrees
+ * - `tile`: the selected tile
+ * - `only`: the isolated tile
+ * - `box`: low and high corner of the clip box, um
+ * - `cut`: normal and offset (um) of the clip plane; `none`: the opening cut is removed
+ * - `points`: the points of the newest measurement, um
+ * - `measures`: the finished measurements (see measurements_link.ts)
+ * - `views`: the saved views, each in the form of `eye`
+ * - `objects`: selection and colours of label maps (see objects/linked.ts)
+ * - `light`: settings of path tracing (see path_trace_link.ts)
+ * - `eye`: position and target of the camera, m of the scene
+ * - `pose`: place, rotation and scale of a specimen that was moved
+ *
+ * Further names (such as `tool`, `dwell` and `quality`) are the `link` of a parameter in state/parameters.
+ *
+ * The letters of a channel in `l`:
+ *
+ * - `c`: colour, sRGB
+ * - `o`: opacity
+ * - `w`: window, `low_high`
+ * - `s`: shapes of a transfer function, `name_shapes` (see shapes_link.ts)
+ * - `t`: name of the transfer function
+ * - `n`: no volume
+ *
  * An address may come from anyone. Any text leads only to actions that a user could take, and an unreadable part is
  * reported and left out.
  */
@@ -28,7 +52,7 @@ import { allParameters } from "../state/parameters/table";
 import { VOLUMES } from "../state/parameters/volumes";
 import { OWN } from "../state/transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
-import { readLook, writeLook } from "./camera_link";
+import { readCamera, writeCamera } from "./camera_link";
 import { linkedMeasurements, readMeasurements } from "./measurements_link";
 import { readNumbers, written } from "./numbers";
 import { readWord, type SwitchWords, writeWords } from "./parameter_words";
@@ -89,10 +113,10 @@ function linkOf(
       .map(({ id }) => encodeURIComponent(id))
       .join(",");
   if (shownOf(state) !== shownOf(start)) parts.c = shownOf(state);
-  const cameras = state.channels.flatMap((channel, i) =>
+  const appearances = state.channels.flatMap((channel, i) =>
     writeChannel(channel, start.channels[i], has),
   );
-  if (cameras.length > 0) parts.l = cameras.join(",");
+  if (appearances.length > 0) parts.l = appearances.join(",");
   Object.assign(parts, Object.fromEntries(writeWords(VOLUMES, state, start, WORDS)));
   const objects = Object.entries(state.objects).flatMap(([id, view]) => {
     const text = objectsOf(id, view);
@@ -115,7 +139,7 @@ function linkOf(
   Object.assign(parts, Object.fromEntries(writeWords(otherParameters(), state, start, WORDS)));
   const light = writeLight(state, start);
   if (light !== "") parts.light = light;
-  Object.assign(parts, camera === null ? {} : writeLook(camera));
+  Object.assign(parts, camera === null ? {} : writeCamera(camera));
   return `#${Object.entries(parts)
     .map(([name, text]) => `${name}=${text}`)
     .join("&")}`;
@@ -157,7 +181,10 @@ export function readLink(hash: string, state: ViewerState, specimen: Box): Share
     camera: null,
   });
   if (text === "") return { actions: [], camera: null };
-  if (text.length > LONGEST) return refused("it is too long to be one of this viewer's.");
+  if (text.length > LONGEST)
+    return refused(
+      `found ${text.length} characters, expected at most ${LONGEST}: copy the link again.`,
+    );
   const parts = new Map(
     text.split("&").map((part) => {
       const at = part.indexOf("=");
@@ -165,9 +192,12 @@ export function readLink(hash: string, state: ViewerState, specimen: Box): Share
     }),
   );
   const version = parts.get("v");
-  if (version === undefined) return refused("what follows the # is no view of this viewer.");
+  if (version === undefined)
+    return refused(`v is missing after the #, expected v=${VERSION}: copy the whole link again.`);
   if (version !== VERSION) {
-    return refused(`this viewer reads version ${VERSION}, found ${shortened(version)}.`);
+    return refused(
+      `v is ${shortened(version)}, expected ${VERSION}: open the link with the viewer that wrote it.`,
+    );
   }
   return new LinkReader(parts, state, specimen).read();
 }
@@ -200,7 +230,7 @@ class LinkReader {
 
   read(): Shared {
     this.readShown();
-    this.readLooks();
+    this.readAppearances();
     this.readObjects();
     this.readParameters(VOLUMES);
     this.tile("tile", "select");
@@ -212,10 +242,10 @@ class LinkReader {
     this.readViews();
     this.readLight();
     const eye = this.parts.get("eye");
-    const camera = eye === undefined ? null : readLook(eye, this.parts.get("pose") ?? null);
+    const camera = eye === undefined ? null : readCamera(eye, this.parts.get("pose") ?? null);
     if (eye !== undefined && camera === null) this.unread.push("eye");
     this.report("this bundle has no", this.unknown);
-    this.report("left out what can't be read:", this.unread);
+    this.report("left out parts that can't be read:", this.unread);
     return { actions: this.actions, camera };
   }
 
@@ -259,16 +289,16 @@ class LinkReader {
     });
   }
 
-  private readLooks(): void {
+  private readAppearances(): void {
     const text = this.parts.get("l");
     if (text === undefined) return;
     for (const entry of text.split(",")) {
-      const [id, ...cameras] = entry.split(":");
+      const [id, ...words] = entry.split(":");
       const channel = this.channel(id);
       if (channel === null) continue;
-      for (const camera of cameras) {
-        const action = lookAction(channel, camera);
-        if (action === null) this.unread.push(`l ${shortened(`${channel.id}:${camera}`)}`);
+      for (const word of words) {
+        const action = appearanceAction(channel, word);
+        if (action === null) this.unread.push(`l ${shortened(`${channel.id}:${word}`)}`);
         else this.actions.push(action);
       }
     }
@@ -361,7 +391,7 @@ class LinkReader {
     if (text === undefined) return;
     const words = text.split(",");
     const views = Array.from({ length: Math.ceil(words.length / 6) }, (_, i) =>
-      readLook(words.slice(6 * i, 6 * i + 6).join(), null),
+      readCamera(words.slice(6 * i, 6 * i + 6).join(), null),
     ).flatMap((view) => (view === null ? [] : [{ position: view.position, target: view.target }]));
     if (6 * views.length !== words.length) this.unread.push("views");
     else this.actions.push({ type: "keep-views", views });
@@ -375,8 +405,8 @@ class LinkReader {
   }
 }
 
-function lookAction({ id, transferFunctions }: ChannelState, camera: string): Action | null {
-  const [letter, value] = [camera.slice(0, 1), camera.slice(1)];
+function appearanceAction({ id, transferFunctions }: ChannelState, word: string): Action | null {
+  const [letter, value] = [word.slice(0, 1), word.slice(1)];
   const row = CHANNEL.find(({ link }) => link === letter);
   if (row !== undefined) return readWord(row, value, CHANNEL_WORDS, id);
   switch (letter) {

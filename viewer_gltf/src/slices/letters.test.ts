@@ -80,8 +80,8 @@ describe("a slice's letters", () => {
         };
         // in the middle of each edge, a tenth of the picture inwards
         const seen = [at(0.1, 0.5), at(0.9, 0.5), at(0.5, 0.1), at(0.5, 0.9)];
-        const said = frame.ends.map((letter) => BRIGHT[letter as keyof typeof BRIGHT]);
-        expect(seen, `${frame.name} of ${JSON.stringify(sides)}`).toEqual(said);
+        const expected = frame.ends.map((letter) => BRIGHT[letter as keyof typeof BRIGHT]);
+        expect(seen, `${frame.name} of ${JSON.stringify(sides)}`).toEqual(expected);
       }
     }
   });

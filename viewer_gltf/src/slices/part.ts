@@ -93,8 +93,8 @@ class SlicesPart implements Part {
 
   /** The slices are the first section for a patient on a flat screen. */
   panel(): readonly PartSection[] {
-    const { state, isInRoom, bundle } = this.host;
-    const isFirst = bundle.manifest.specimen.sides !== undefined && !isInRoom;
+    const { state, isInStereo, bundle } = this.host;
+    const isFirst = bundle.manifest.specimen.sides !== undefined && !isInStereo;
     return sliceSections(state, this.values, isFirst);
   }
 
@@ -104,8 +104,8 @@ class SlicesPart implements Part {
     return images === null || images.frames === null ? [] : images.valuesAt(images.point);
   }
 
-  advance({ sight }: FrameView): void {
-    this.slices?.update(sight);
+  advance({ eyeView }: FrameView): void {
+    this.slices?.update(eyeView);
   }
 
   retryFailed(): void {

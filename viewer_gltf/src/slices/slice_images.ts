@@ -52,7 +52,7 @@ export class SliceImages {
   version = 0;
   isLoading = false;
   /** Whether texels have loaded; until then the images are black. */
-  hasCome = false;
+  hasLoaded = false;
   private readonly cache: TexelCache;
   private state: ViewerState | null = null;
   private layers: readonly Layer[] = [];
@@ -155,7 +155,7 @@ export class SliceImages {
         );
         if (this.isDisposed || wanted !== this.loaded) return; // other channels or tiles are shown by now
         this.layers = layers;
-        this.hasCome = true;
+        this.hasLoaded = true;
         this.sampled = "";
         this.draw();
       }

@@ -15,7 +15,7 @@ import {
 } from "three";
 import { keepUnclipped } from "../gpu/unclipped_material";
 import { Label } from "../marks/label";
-import type { Sight } from "../marks/style";
+import type { EyeView } from "../marks/style";
 import { AHEAD, type Box, boxSpan } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { MAX_CORNERS } from "../math/plane_box_section";
@@ -141,8 +141,8 @@ export class SlicePlanes {
   }
 
   sync(areShown: boolean): void {
-    const { frames, box, point, hasCome } = this.images;
-    this.group.visible = areShown && hasCome && frames !== null;
+    const { frames, box, point, hasLoaded } = this.images;
+    this.group.visible = areShown && hasLoaded && frames !== null;
     if (!this.group.visible || frames === null) return;
     this.planes.place(frames, box);
     const place = JSON.stringify(frames);
@@ -187,7 +187,7 @@ export class SlicePlanes {
     return this.group.visible ? 1 + this.placed : 0;
   }
 
-  update(sight: Sight): void {
+  update(eyeView: EyeView): void {
     const { frames, box, version } = this.images;
     if (!this.group.visible || frames === null) return;
     if (this.version !== version) {
@@ -196,7 +196,7 @@ export class SlicePlanes {
       this.planes.place(frames, box); // the texture's size may have changed
     }
     this.letters.forEach((letter, i) => {
-      letter.place(this.places[i], sight);
+      letter.place(this.places[i], eyeView);
     });
   }
 

@@ -101,7 +101,7 @@ class SliceFigure {
   private writeValues(): void {
     const at = this.place;
     const values = this.images.valuesAt(at);
-    const text = values.length > 0 || this.images.hasCome ? values.join(" · ") : "loading …";
+    const text = values.length > 0 || this.images.hasLoaded ? values.join(" · ") : "loading …";
     if (text !== this.written) {
       // one span for each channel, so that no line breaks between a value and its name
       const parts = values.length > 0 ? values : [text];

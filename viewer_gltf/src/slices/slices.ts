@@ -1,6 +1,6 @@
 /** The slices as images in the page and in the scene. This code is loaded separately, when slices are first shown. */
 import "./slices.css";
-import type { Sight } from "../marks/style";
+import type { EyeView } from "../marks/style";
 import type { Action } from "../state/actions";
 import type { ViewerState } from "../state/viewer_state";
 import { sharesOf, turnedBy } from "./slice_frame";
@@ -49,8 +49,8 @@ export class Slices {
     this.pictures.update(this.state.hasSlicePictures);
   }
 
-  update(sight: Sight): void {
-    this.planes.update(sight);
+  update(eyeView: EyeView): void {
+    this.planes.update(eyeView);
   }
 
   /** Changes the window of the first shown channel. */

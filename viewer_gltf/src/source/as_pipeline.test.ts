@@ -207,7 +207,7 @@ describe.skipIf(!hasPython)("a source in the page, compared with the pipeline", 
     const source = await localSource(join(folder, "v04.ome.zarr"));
     if (source.kind !== "folder") throw new Error("expected a folder");
     await expect(openZarr(new LocalFolder(source.find), "v04", 400)).rejects.toThrow(
-      "whoever made the image has to add coarser levels",
+      "ask its author to add coarser levels",
     );
   });
 

@@ -41,10 +41,10 @@ export function chooseColors(
       return [...PALETTE.slice(turn), ...PALETTE.slice(0, turn)];
     },
   ];
-  for (const wishes of rounds) {
+  for (const candidates of rounds) {
     for (const place of stated.keys()) {
       if (chosen.has(place)) continue;
-      const free = wishes(place).find(
+      const free = candidates(place).find(
         (color) =>
           color !== null && Math.max(...color) > BLACK && !isNear(color, [...chosen.values()]),
       );

@@ -72,7 +72,7 @@ export function makeCoarse(
   const sample = sampleOf(stored);
   const least = leastOf(sample);
   if (least === null) {
-    throw new SourceError(`${where}: all voxels are NaN or infinite, expected an image.`);
+    throw new SourceError(`${where}: all voxels are NaN or infinite, expected finite numbers.`);
   }
   // Values that are not finite become the smallest one, as in the readers of the pipeline.
   for (const values of [voxels, sample]) {
@@ -110,7 +110,7 @@ function blockMeans({ data, ...stored }: StoredVoxels, block: Triple, shape: Tri
   return voxels;
 }
 
-/** Values that are spread evenly over all voxels, in the order in which they are stored. */
+/** Returns values of voxels that are spread evenly over the volume, in the order in which they are stored. */
 function sampleOf({ data, shape, slope, intercept }: StoredVoxels): Float32Array<ArrayBuffer> {
   const count = Math.min(data.length, volumeOf(shape));
   let every = Math.ceil(count / SAMPLED_VOXELS);

@@ -15,7 +15,7 @@
 const MAX_STEPS = 200;
 
 /**
- * The level, 0..1 in the window; null for a constant channel.
+ * Returns the level, 0..1 in the window; null for a constant channel.
  *
  * @param histogram voxel counts over 0..1 in equal bins
  */

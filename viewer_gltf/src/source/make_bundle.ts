@@ -234,7 +234,7 @@ function bake(functions: readonly OpacityPoints[]): Uint8Array {
   return table;
 }
 
-/** The box along the world's axes around a box that a matrix (column-major) moves. */
+/** Moves a box by a matrix (column-major), and returns the box along the world's axes that encloses the result. */
 function moved(
   { min, max }: TileVolume["bounds_um"],
   m: TileVolume["matrix"],
@@ -249,7 +249,7 @@ function moved(
   return { min: [low[0], low[1], low[2]], max: [high[0], high[1], high[2]] };
 }
 
-/** Returns a name for use in a path, by the rules of model/identifiers.py: a link to a view then fits a build, too. */
+/** Returns a name for use in a path. It follows model/identifiers.py, so that links to a view also work with a build. */
 export function identifierOf(name: string): string {
   return [...name]
     .map((char, i, all) => {

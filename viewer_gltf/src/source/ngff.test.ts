@@ -39,7 +39,7 @@ describe("the metadata of OME-Zarr", () => {
     const found = parseNgff(old, "x");
     expect(found.axes).toEqual(["t", "c", "z", "y", "x"]);
     expect(found.notes).toEqual([
-      "OME-Zarr 0.3 states no voxel spacing with a unit, so 1 um is assumed. Lengths may be wrong.",
+      "OME-Zarr 0.3 states no voxel spacing with a unit. The viewer assumes 1 µm, so lengths may be wrong.",
     ]);
     const older = { multiscales: [{ datasets: [{ path: "0" }] }] };
     expect(parseNgff(older, "x").axes).toEqual(["t", "c", "z", "y", "x"]);
@@ -67,23 +67,23 @@ describe("the metadata of OME-Zarr", () => {
     [null, "found no `multiscales`"],
     [{ plate: {} }, "found a plate"],
     [{ ome: { "bioformats2raw.layout": 3 } }, "found several images"],
-    [{ multiscales: [{ axes: AXES, datasets: [] }] }, "expected a level"],
-    [{ multiscales: [{ axes: AXES.slice(2), datasets: [{ path: "0" }] }] }, "no axis z"],
+    [{ multiscales: [{ axes: AXES, datasets: [] }] }, "expected at least one level"],
+    [{ multiscales: [{ axes: AXES.slice(2), datasets: [{ path: "0" }] }] }, "axes lack z"],
     [
       { multiscales: [{ axes: ["z", "y", "x", "q"], datasets: [{ path: "0" }] }] },
-      "axes: found z, y, x, q",
+      "axes are z, y, x, q",
     ],
     [
       { multiscales: [{ axes: ["z", "y", "x", "x"], datasets: [{ path: "0" }] }] },
-      "axes: found z, y, x, x",
+      "axes are z, y, x, x",
     ],
     [image({}, [scale(1, 2)]), "expected scales and translations of 4 numbers"],
-    [image({}, [{ type: "affine", affine: [] }]), "coordinateTransformations: found"],
+    [image({}, [{ type: "affine", affine: [] }]), "coordinateTransformations has"],
     [image({}, [scale(1, 0, 1, 1)]), "expected lengths above 0"],
     [image({}, [scale(1, -2, 1, 1)]), "expected lengths above 0"],
     [
       { multiscales: [{ axes: AXES, datasets: [{ path: "../../secret" }] }] },
-      "expected a level below it",
+      "expected a level inside the image",
     ],
   ] as const)("are refused: %j", (attributes, text) => {
     expect(() => parseNgff(attributes, "x")).toThrow(text);

@@ -77,7 +77,7 @@ function tableOf(value: unknown): Table {
 const listOf = (value: unknown): readonly unknown[] => (Array.isArray(value) ? value : []);
 
 /**
- * The image of a group's attributes.
+ * Reads the image that a group's attributes describe.
  *
  * @param where the source, for messages
  * Throws SourceError.
@@ -98,12 +98,14 @@ export function parseNgff(attributes: unknown, where: string): NgffImage {
     levelOf(tableOf(dataset), image, axes, where),
   );
   if (levels.length === 0) {
-    throw new SourceError(`${where}: multiscales[0].datasets: found none, expected a level.`);
+    throw new SourceError(
+      `${where}: multiscales[0].datasets is empty, expected at least one level.`,
+    );
   }
   if (levels[0].scale_um === null) {
     const title = `OME-Zarr ${version}`.trim();
     notes.push(
-      `${title} states no voxel spacing with a unit, so 1 um is assumed. Lengths may be wrong.`,
+      `${title} states no voxel spacing with a unit. The viewer assumes 1 µm, so lengths may be wrong.`,
     );
   }
   const oriented = SPATIAL.map((axis) => orientationOf(axes[names.indexOf(axis)]));
@@ -116,10 +118,12 @@ export function parseNgff(attributes: unknown, where: string): NgffImage {
 
 /** Describes a group without `multiscales`, and names what to open instead. */
 function otherKind(ome: Table): string {
-  if ("plate" in ome) return "found a plate, expected an image: name one of its fields, as A/1/0";
-  if ("well" in ome) return "found a well, expected an image: name one of its fields, as 0";
+  if ("plate" in ome)
+    return "found a plate, expected an image: add the path of a field, for example A/1/0";
+  if ("well" in ome)
+    return "found a well, expected an image: add the path of a field, for example 0";
   if ("bioformats2raw.layout" in ome || "series" in ome) {
-    return "found several images, expected one: name one of them, as 0 behind a slash";
+    return "found several images, expected one: add the path of an image, for example /0";
   }
   return "found no `multiscales`, expected the group of an OME-Zarr image";
 }
@@ -132,14 +136,12 @@ function axesOf(image: Table, where: string): { axes: readonly Table[]; names: r
   const isKnown = names.every((name) => ["t", "c", ...SPATIAL].includes(name));
   if (!isKnown || new Set(names).size < names.length) {
     throw new SourceError(
-      `${where}: axes: found ${names.join(", ")}, expected z, y and x, and perhaps t and c.`,
+      `${where}: axes are ${names.join(", ")}, expected z, y and x, and optionally t and c.`,
     );
   }
   const missing = SPATIAL.find((axis) => !names.includes(axis));
   if (missing !== undefined) {
-    throw new SourceError(
-      `${where}: found no axis ${missing}, expected a volume: StereoCell does not show single planes.`,
-    );
+    throw new SourceError(`${where}: axes lack ${missing}, expected a volume with z, y and x.`);
   }
   return { axes, names };
 }
@@ -155,7 +157,7 @@ function levelOf(dataset: Table, image: Table, axes: readonly Table[], where: st
     const isRead = type === "scale" || type === "translation";
     if (!isRead || values.length !== axes.length || !values.every(Number.isFinite)) {
       throw new SourceError(
-        `${where}: coordinateTransformations: found ${JSON.stringify(step).slice(0, 80)}, ` +
+        `${where}: coordinateTransformations has ${JSON.stringify(step).slice(0, 80)}, ` +
           `expected scales and translations of ${axes.length} numbers.`,
       );
     }
@@ -168,12 +170,14 @@ function levelOf(dataset: Table, image: Table, axes: readonly Table[], where: st
   }
   const path = String(dataset.path ?? "");
   if (path === "" || path.split("/").includes("..")) {
-    throw new SourceError(`${where}: datasets: path: found "${path}", expected a level below it.`);
+    throw new SourceError(
+      `${where}: datasets: path is "${path}", expected a level inside the image.`,
+    );
   }
   const scale_um = lengths(scale, axes);
   if (scale_um?.some((length) => !(length > 0))) {
     throw new SourceError(
-      `${where}: level ${path}: scale: found ${scale_um.join(", ")} um, expected lengths above 0.`,
+      `${where}: level ${path}: scale is ${scale_um.join(", ")} um, expected lengths above 0.`,
     );
   }
   return { path, scale_um, shift_um: lengths(shift, axes) };

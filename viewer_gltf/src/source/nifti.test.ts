@@ -136,7 +136,7 @@ describe("a header of NIfTI", () => {
       "x",
     );
     expect(flat.notes).toEqual([
-      "The sform of the file does not have three independent axes and is not used.",
+      "The sform of the file is not used, because its three axes are not independent.",
     ]);
     expect(flat.hasSides).toBe(true);
   });
@@ -159,22 +159,22 @@ describe("a header of NIfTI", () => {
   });
 
   it.each([
-    [{ mark: "ni1\0" }, "expected one file: save it as .nii"],
-    [{ mark: "abc\0" }, "found no header of NIfTI"],
-    [{ datatype: 128 }, "datatype: found colours"],
-    [{ datatype: 32 }, "datatype: found complex numbers"],
-    [{ datatype: 77 }, "datatype: found code 77"],
-    [{ dim: [2, 3, 2, 1, 1, 1, 1, 1] }, "dim: found 3 x 2, expected x, y, z"],
-    [{ dim: [5, 3, 2, 2, 1, 3, 1, 1] }, "dim: found 3 x 2 x 2 x 1 x 3"],
-    [{ dim: [3, 3, -2, 2, 1, 1, 1, 1] }, "dim: found 3 x -2 x 2"],
-    [{ dim: [9999, 3, 2, 2, 0, 1, 1, 1] }, "dim: found"],
+    [{ mark: "ni1\0" }, "expected a single file: save it as .nii"],
+    [{ mark: "abc\0" }, "found no NIfTI header"],
+    [{ datatype: 128 }, "datatype is colours"],
+    [{ datatype: 32 }, "datatype is complex numbers"],
+    [{ datatype: 77 }, "datatype is code 77"],
+    [{ dim: [2, 3, 2, 1, 1, 1, 1, 1] }, "dim is 3 x 2, expected x, y, z"],
+    [{ dim: [5, 3, 2, 2, 1, 3, 1, 1] }, "dim is 3 x 2 x 2 x 1 x 3"],
+    [{ dim: [3, 3, -2, 2, 1, 1, 1, 1] }, "dim is 3 x -2 x 2"],
+    [{ dim: [9999, 3, 2, 2, 0, 1, 1, 1] }, "dim is"],
   ] as const)("is refused: %j", (options, text) => {
     expect(() => parseNifti(header(options), "head.nii")).toThrow(text);
   });
 
   it("is refused if it is cut short, or is not from a NIfTI file", () => {
     for (const bytes of [new Uint8Array(0), header().slice(0, 200), new Uint8Array(600)]) {
-      expect(() => parseNifti(bytes, "head.nii")).toThrow("head.nii: found no header of NIfTI");
+      expect(() => parseNifti(bytes, "head.nii")).toThrow("head.nii: found no NIfTI header");
     }
   });
 });
@@ -210,7 +210,7 @@ describe("a file of NIfTI", () => {
   it("is refused if it is cut short or damaged", async () => {
     const whole = file({ sform: SFORM });
     await expect(read(new File([whole.slice(0, 370)], "head.nii"))).rejects.toThrow(
-      "head.nii: found 18 bytes of voxels, expected 24: the file is cut short.",
+      "head.nii: found 18 bytes of voxels, expected 24: the file is incomplete.",
     );
     const packed = gzipSync(new Uint8Array(await whole.arrayBuffer()));
     packed.fill(7, 12, 40);

@@ -86,11 +86,11 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   const mark = String.fromCharCode(...bytes.subarray(...(size === 540 ? [4, 7] : [344, 347])));
   const isWhole = bytes.length >= size && (size === 348 || size === 540);
   if (!isWhole || !/^n[+i][12]$/.test(mark)) {
-    throw new SourceError(`${where}: found no header of NIfTI, expected a whole .nii or .nii.gz.`);
+    throw new SourceError(`${where}: found no NIfTI header, expected a complete .nii or .nii.gz.`);
   }
   if (mark[1] === "i") {
     throw new SourceError(
-      `${where}: found the header of a pair .hdr and .img, expected one file: save it as .nii.`,
+      `${where}: found the header of a .hdr and .img pair, expected a single file: save it as .nii.`,
     );
   }
   const version = size === 540 ? 2 : 1;
@@ -109,7 +109,7 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   const shape = dim.slice(1, 1 + Math.min(7, Math.max(0, dim[0])));
   if (shape.length < 3 || shape.some((n) => n < 1) || shape.slice(4).some((n) => n !== 1)) {
     throw new SourceError(
-      `${where}: dim: found ${shape.join(" x ")}, expected x, y, z, or x, y, z, t.`,
+      `${where}: dim is ${shape.join(" x ")}, expected x, y, z, or x, y, z, t.`,
     );
   }
   const code = view.getInt16(at.datatype, isLittleEndian);
@@ -117,7 +117,7 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   if (type === undefined) {
     const found = OTHERS[code] ?? `code ${code}`;
     throw new SourceError(
-      `${where}: datatype: found ${found}, expected integers of up to 32 bits or floating-point numbers.`,
+      `${where}: datatype is ${found}, expected integers of up to 32 bits or floating-point numbers.`,
     );
   }
   const offset = version === 1 ? real(at.offset) : whole(at.offset);
@@ -138,7 +138,8 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   const notes = forms
     .filter(([, form]) => !isSound(form))
     .map(
-      ([name]) => `The ${name} of the file does not have three independent axes and is not used.`,
+      ([name]) =>
+        `The ${name} of the file is not used, because its three axes are not independent.`,
     );
   const plain: Affine = {
     axes: [
@@ -150,9 +151,7 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   };
   const ras = sound.length > 0 ? sound[0][1] : plain;
   if (!isSound(ras)) {
-    throw new SourceError(
-      `${where}: pixdim: found no valid lengths, expected three voxel spacings.`,
-    );
+    throw new SourceError(`${where}: pixdim has no valid lengths, expected three voxel spacings.`);
   }
   if (sound.length === 0) {
     notes.push("The file states no orientation, so left and right may be swapped.");

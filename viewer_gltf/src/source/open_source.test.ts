@@ -13,7 +13,7 @@ describe("dropped files that the page can't read", () => {
     ["a TIFF", { kind: "file", file: new File(["II*"], "cells.tif") }],
   ])("is %s: another way is named", async (_, source) => {
     const fault = await faultOf(source);
-    expect(fault).toContain("for other formats, and DICOM, use stereocell view");
+    expect(fault).toContain("open it with stereocell view");
     expect(fault).not.toContain("host");
   });
 });

@@ -64,8 +64,8 @@ async function openFile(file: ByteSource, report: Report): Promise<OpenedImage> 
 
 function otherFormat(name: string, address = ""): SourceError {
   return new SourceError(
-    `${name}: expected a NIfTI file (.nii, .nii.gz), an OME-Zarr folder or a zipped one (.ozx): for other formats, and ` +
-      `DICOM, use stereocell view ${address}`.trimEnd(),
+    `${name}: found another format, expected NIfTI (.nii, .nii.gz) or OME-Zarr (a folder or .ozx): open it with ` +
+      `stereocell view ${address}`.trimEnd(),
   );
 }
 

@@ -32,5 +32,5 @@ export type OpenedImage = Readonly<{
   notes: readonly string[];
 }>;
 
-/** Reports how far it has come, in words. */
+/** Reports the progress as a text for the user. */
 export type Report = (text: string) => void;

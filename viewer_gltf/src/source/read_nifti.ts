@@ -7,9 +7,9 @@ import type { OpenedImage, Report } from "./opened_image";
 import { SourceError } from "./source_error";
 import { partsOf } from "./zip_store";
 
-/** Largest volume that is read: a page has little more memory than twice that. */
+/** Largest volume that is read, bytes. Reading needs twice that, and a page has little more memory. */
 const MAX_BYTES = 1 << 30;
-/** Header and extensions before the voxels, at most. */
+/** Largest size of the header and its extensions before the voxels, bytes. */
 const MAX_OFFSET = 1 << 28;
 
 const ARRAYS: Readonly<
@@ -39,8 +39,8 @@ export async function openNifti(file: ByteSource, report: Report): Promise<Opene
   if (volumeOf(block) > 1) {
     const size = triple((i) => Math.floor(shape[i] / block[i]));
     notes.push(
-      `The volume is shown with ${size[2]} x ${size[1]} x ${size[0]} of its ${nx} x ${ny} x ${nz} voxels. Use ` +
-        "stereocell build to see all.",
+      `The volume is reduced from ${nx} x ${ny} x ${nz} to ${size[2]} x ${size[1]} x ${size[0]} voxels. Use ` +
+        "stereocell build to see all voxels.",
     );
   }
   return {
@@ -84,7 +84,7 @@ async function readFile(file: ByteSource, report: Report): Promise<FirstVolume> 
   const expected = volume.voxels.length;
   if (found < expected) {
     throw new SourceError(
-      `${name}: found ${found} bytes of voxels, expected ${expected}: the file is cut short.`,
+      `${name}: found ${found} bytes of voxels, expected ${expected}: the file is incomplete.`,
     );
   }
   return volume;
@@ -117,7 +117,7 @@ function bytesOf({ shape, bytesPerVoxel, offset }: NiftiHeader, name: string): n
   const bytes = volumeOf(shape) * bytesPerVoxel;
   if (bytes <= MAX_BYTES && offset <= MAX_OFFSET) return bytes;
   throw new SourceError(
-    `${name}: found a volume of ${Math.round(bytes / 1e6)} MB, which is too large for a page. Open it with: stereocell view`,
+    `${name}: found a volume of ${Math.round(bytes / 1e6)} MB, which is too large for a page: open it with stereocell view.`,
   );
 }
 
@@ -132,7 +132,7 @@ async function* unpackedParts(file: ByteSource): AsyncGenerator<Uint8Array<Array
     yield* partsOf(isPacked ? whole.pipeThrough(new DecompressionStream("gzip")) : whole);
   } catch (error) {
     throw new SourceError(
-      `${file.name}: the file can't be unpacked, or the connection broke. Expected a complete .nii or .nii.gz.`,
+      `${file.name}: the file can't be unpacked, or the connection broke, expected a complete .nii or .nii.gz: try again, or make the file again.`,
       { cause: error },
     );
   }

@@ -71,8 +71,8 @@ export async function openZarr(
     const voxels = await readLevel(array, image.axes, index, queue, name);
     if (counts.found === 0 && counts.missing > 0) {
       throw new SourceError(
-        `${name}: none of the ${counts.missing} chunks that level ${image.levels[level].path} names is there: whoever ` +
-          "made the image has to upload its chunks, too.",
+        `${name}: found none of the ${counts.missing} chunks of level ${image.levels[level].path}: ask the author of the ` +
+          "image to upload them.",
       );
     }
     return makeCoarse(canonical === null ? voxels : turned(voxels, canonical), block, place, name);
@@ -143,7 +143,7 @@ async function attributesOf(store: Store, name: string): Promise<unknown> {
   const node = await explained(name, () => zarr.open(store));
   if (node instanceof zarr.Array) {
     throw new SourceError(
-      `${name}: found a Zarr array, expected the group of an OME-Zarr image, which is often the folder above it.`,
+      `${name}: found a Zarr array, expected the group of an OME-Zarr image: try the folder above it.`,
     );
   }
   return node.attrs;
@@ -160,7 +160,9 @@ function notesOn(
   const times = image.axes.includes("t") ? finest.shape[image.axes.indexOf("t")] : 1;
   if (times > 1) notes.push(`Only the first of ${times} time points is shown.`);
   if (chosen.length < total) {
-    notes.push(`Only ${chosen.length} of ${total} channels are shown, the most that a page reads.`);
+    notes.push(
+      `Only ${chosen.length} of ${total} channels are shown, because a page reads no more.`,
+    );
   }
   const count = image.levels.length;
   if (level > 0) {

@@ -34,7 +34,7 @@ async function ask(url: URL, options: RequestInit = {}): Promise<Response | null
     const { status, ok } = response;
     if (NO_FILE.includes(status)) return null;
     if (ok) return response;
-    const message = `The host ${url.host} answers ${status} for ${url.pathname}`;
+    const message = `The host ${url.host} answers with status ${status} for ${url.pathname}`;
     if (status === BUSY || status >= FIRST_SERVER_FAULT) {
       throw new TemporaryError(`${message}. Try again later, or ask the operator of the host.`);
     }
@@ -95,8 +95,8 @@ async function partOf(
   const bytes = await bodyOf(response, url);
   if (bytes.length === length) return bytes;
   throw new SourceError(
-    `${url.pathname}: found ${bytes.length} of ${length} bytes from ${offset} on: the file is cut short. Ask the ` +
-      "operator of the host to upload it again.",
+    `${url.pathname}: found ${bytes.length} bytes from ${offset} on, expected ${length}: ask the operator of the host to ` +
+      "upload the file again.",
   );
 }
 

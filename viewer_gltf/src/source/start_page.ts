@@ -35,7 +35,7 @@ export function chooseSource(parent: HTMLElement): Promise<ShownSource> {
       element("h1", { textContent: "StereoCell" }),
       element("p", {
         textContent:
-          "Drop a NIfTI file, the folder of an OME-Zarr image or a zipped one (.ozx) here. The image is read in this " +
+          "Drop a NIfTI file, an OME-Zarr folder or a zipped OME-Zarr image (.ozx) here. The image is read in this " +
           "page and does not leave this device.",
       }),
       element("div", { className: "choices" }, {}, ...choices(open)),

@@ -22,24 +22,24 @@ export function isNothingFound(error: unknown): boolean {
 function faultOf(error: unknown): string | null {
   if (zarr.isZarritaError(error, "NotFoundError")) {
     return (
-      "found neither zarr.json nor the metadata of Zarr v2, expected an OME-Zarr image. Check the address, or ask " +
+      "found neither zarr.json nor the metadata of Zarr v2, expected an OME-Zarr image: check the address, or ask " +
       "the operator of the host whether the image is public."
     );
   }
   if (zarr.isZarritaError(error, "UnknownCodecError")) {
     return (
-      `the voxels are packed by ${error.codec}, which no browser unpacks: whoever made the image has to write it with ` +
-      "blosc, zstd, gzip or lz4, or open it by: stereocell view"
+      `found voxels packed by ${error.codec}, expected blosc, zstd, gzip or lz4: open the image with stereocell view, or ` +
+      "ask its author for another codec."
     );
   }
   if (zarr.isZarritaError(error, "CodecPipelineError")) {
-    return `a chunk can't be unpacked by ${error.codec}: whoever made the image has to write it again.`;
+    return `found a chunk that ${error.codec} can't unpack: ask the author of the image to write it again.`;
   }
   if (zarr.isZarritaError(error)) {
-    return `${error.message}: whoever made the image has to correct its metadata.`;
+    return `${error.message}: ask the author of the image to correct its metadata.`;
   }
   if (error instanceof SyntaxError) {
-    return "its metadata are not valid JSON: whoever made the image has to correct them.";
+    return "found metadata that are not valid JSON: ask the author of the image to correct them.";
   }
   return null;
 }

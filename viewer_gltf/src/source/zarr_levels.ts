@@ -26,19 +26,19 @@ export async function openLevel(
   const { shape, dtype, chunks } = array;
   if (shape.length !== image.axes.length || shape.some((n) => n < 1)) {
     throw new SourceError(
-      `${where}: found the shape ${shape.join(" x ")}, expected ${image.axes.length} axes as \`axes\` has them.`,
+      `${where}: shape is ${shape.join(" x ")}, expected the ${image.axes.length} axes that \`axes\` lists.`,
     );
   }
   if (!NUMBERS.test(dtype)) {
     throw new SourceError(
-      `${where}: found voxels of type ${dtype}, expected whole numbers, or real ones of 32 or 64 bits.`,
+      `${where}: data type is ${dtype}, expected integers, or floating-point numbers of 32 or 64 bits.`,
     );
   }
   const bytes = chunks.reduce((product, n) => product * n, Number(/\d+/.exec(dtype)?.[0]) / 8);
   if (bytes > MAX_CHUNK_BYTES) {
     throw new SourceError(
-      `${where}: found chunks of ${Math.round(bytes / 1e6)} MB, too large for a page: whoever made the image has to ` +
-        `write smaller ones, or open it by: stereocell view`,
+      `${where}: found chunks of ${Math.round(bytes / 1e6)} MB, expected at most ${Math.round(MAX_CHUNK_BYTES / 1e6)} MB: open the ` +
+        "image with stereocell view, or ask its author for smaller chunks.",
     );
   }
   return array;
@@ -66,8 +66,8 @@ export async function chooseLevel(
     if (level === last) {
       const millions = (n: number) => `${Math.round(n / 1e6)} million voxels`;
       throw new SourceError(
-        `${name}: its coarsest level has ${millions(voxels)} a channel and a page reads ${millions(mostRead)}: whoever ` +
-          "made the image has to add coarser levels, or open it by: stereocell view",
+        `${name}: the coarsest level has ${millions(voxels)} per channel, expected at most ${millions(mostRead)}: open ` +
+          "the image with stereocell view, or ask its author to add coarser levels.",
       );
     }
   }

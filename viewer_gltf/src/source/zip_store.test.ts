@@ -104,8 +104,8 @@ describe("a zip archive of OME-Zarr", () => {
   });
 
   it.each([
-    ["no archive", new File(["no zip at all"], "image.ozx"), "found no zip archive that is whole"],
-    ["an empty file", new File([], "image.ozx"), "found no zip archive that is whole"],
+    ["no archive", new File(["no zip at all"], "image.ozx"), "found no complete zip archive"],
+    ["an empty file", new File([], "image.ozx"), "found no complete zip archive"],
     ["no group", archive([{ name: "a.txt", text: "1" }]), "without a Zarr group"],
     [
       "two groups",

@@ -54,8 +54,8 @@ export class ZipStore implements FileStore {
     const root = rootOf([...members.keys()]);
     if (root === null) {
       throw new SourceError(
-        `${archive.name}: found a zip archive without a Zarr group, expected OME-Zarr: for other formats, and DICOM, ` +
-          "use stereocell view",
+        `${archive.name}: found a zip archive without a Zarr group, expected OME-Zarr: open other formats, such as ` +
+          "DICOM, with stereocell view",
       );
     }
     return new ZipStore(archive, members, root);
@@ -90,7 +90,7 @@ export class ZipStore implements FileStore {
     }
     if (offset + length > member.unpacked) {
       throw new SourceError(
-        `${this.archive.name}: ${name}: a shard's index leads beyond its end: make the file again.`,
+        `${this.archive.name}: ${name}: found a shard whose index points beyond its end: make the file again.`,
       );
     }
     return this.archive.read(start + offset, length);
@@ -101,7 +101,7 @@ export class ZipStore implements FileStore {
     const view = viewOf(bytes);
     if (bytes.length < LOCAL_BYTES || view.getUint32(0, true) !== LOCAL) {
       throw new SourceError(
-        `${this.archive.name}: found no member where the list has ${name}: make the file again.`,
+        `${this.archive.name}: found no member at the listed place of ${name}: make the file again.`,
       );
     }
     return LOCAL_BYTES + view.getUint16(26, true) + view.getUint16(28, true);
@@ -115,7 +115,7 @@ export class ZipStore implements FileStore {
     if (method === STORED) return content;
     if (method !== DEFLATED) {
       throw new SourceError(
-        `${this.archive.name}: ${name} is packed by method ${method}: whoever made the file has to store its members.`,
+        `${this.archive.name}: ${name} is packed by method ${method}, expected 0 (stored) or 8 (deflate): make the file again.`,
       );
     }
     const damaged = `${this.archive.name}: ${name} is damaged: make the file again.`;
@@ -160,7 +160,7 @@ const viewOf = (bytes: Uint8Array) =>
 /** Reads the list of members at the end of the archive. */
 async function readList(archive: ByteSource) {
   const wrong = new SourceError(
-    `${archive.name}: found no zip archive that is whole, expected OME-Zarr in one file.`,
+    `${archive.name}: found no complete zip archive, expected an OME-Zarr image in one file.`,
   );
   const size = await archive.size();
   const tailBytes = Math.min(size, END_BYTES + LOCATOR_BYTES + COMMENT_BYTES);
@@ -183,7 +183,7 @@ async function readList(archive: ByteSource) {
   }
   if (bytes > MAX_LIST_BYTES) {
     throw new SourceError(
-      `${archive.name}: found ${count} members, more than a page can list: whoever made the file has to use shards.`,
+      `${archive.name}: found ${count} members, more than a page can list: make the file again with shards.`,
     );
   }
   if (offset + bytes > size) throw wrong;
@@ -203,7 +203,7 @@ function parseList(
   const decoder = new TextDecoder();
   for (let at = 0, i = 0; i < count; i++) {
     if (at + ENTRY_BYTES > bytes.length || view.getUint32(at, true) !== ENTRY) {
-      throw new SourceError(`${where}: the list of its members is damaged: make the file again.`);
+      throw new SourceError(`${where}: found a damaged list of members: make the file again.`);
     }
     const flags = view.getUint16(at + 8, true);
     const [nameBytes, extraBytes, commentBytes] = [28, 30, 32].map((field) =>
@@ -212,7 +212,7 @@ function parseList(
     const name = decoder.decode(bytes.subarray(at + ENTRY_BYTES, at + ENTRY_BYTES + nameBytes));
     if ((flags & 1) === 1) {
       throw new SourceError(
-        `${where}: ${name} has a password: whoever made the file has to leave it out.`,
+        `${where}: ${name} has a password, expected none: make the file again without it.`,
       );
     }
     let [packed, unpacked] = [view.getUint32(at + 20, true), view.getUint32(at + 24, true)];
@@ -236,7 +236,7 @@ function parseList(
       extra += 4 + length;
     }
     if (header + LOCAL_BYTES + packed > end || after + commentBytes > bytes.length) {
-      throw new SourceError(`${where}: the list of its members is damaged: make the file again.`);
+      throw new SourceError(`${where}: found a damaged list of members: make the file again.`);
     }
     if (!name.endsWith("/")) {
       const method = view.getUint16(at + 10, true);

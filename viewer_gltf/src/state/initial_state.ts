@@ -45,7 +45,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     ...START_SETTINGS,
     ...startOfParts(),
     trace: traceLitBy(manifest.lights, manifest.specimen.bounds_um),
-    hasStageRoom: manifest.lights?.room !== undefined,
+    hasStageEnvironment: manifest.lights?.room !== undefined,
     channels: manifest.channels.map((channel, index) => ({
       id: channel.id,
       name: channel.name,

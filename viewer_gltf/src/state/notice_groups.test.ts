@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { groupNotices } from "./notice_groups";
 
-const missing = (n: number) => `volumes/r0_c${n}/CD8.ktx2: the host answers 404`;
+const missing = (n: number) => `volumes/r0_c${n}/CD8.ktx2: the host answered with status 404`;
 
 describe("notices", () => {
   it("form one group if many files have the same fault", () => {
@@ -21,7 +21,7 @@ describe("notices", () => {
   it("stand alone if the fault or the kind of file differs, newest last", () => {
     const texts = [
       missing(0),
-      "a.glb: the host answers 404",
+      "a.glb: the host answered with status 404",
       "a.glb: it is cut short",
       "Link: box: expected 6 numbers",
       "Link: box: expected 7 numbers",

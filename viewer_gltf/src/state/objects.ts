@@ -17,8 +17,8 @@ export type ObjectView = Readonly<{
   /** Bytes at which the palette begins and ends. */
   span: readonly [number, number];
   /**
-   * Whether the palette is spread over the logarithm of the values; null: as the column's bytes
-   * are.
+   * Whether the palette is spread over the logarithm of the values; null: as in the
+   * column's file.
    */
   isLog: boolean | null;
   /**
@@ -47,7 +47,7 @@ export type ObjectView = Readonly<{
   scatter: readonly [string, string];
   /** Points of the lasso in the scatter plot, as shares of its width and height. */
   lasso: readonly (readonly [number, number])[];
-  /** The setting as a link has it, until the table is loaded. */
+  /** The text of these settings in a link, until the table is loaded. */
   linked: string;
 }>;
 

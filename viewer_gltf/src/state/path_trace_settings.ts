@@ -109,7 +109,7 @@ export const MEDIUM_NUMBERS = {
 } as const satisfies TraceNumbers;
 
 /** Brightness of the environment, and its rotation about the vertical axis. */
-export const ROOM_NUMBERS = {
+export const ENVIRONMENT_NUMBERS = {
   environmentLight: { label: "Environment light", start: 1, limits: [0, 4], text: factor },
   environmentTurn_deg: {
     label: "Environment rotation",
@@ -162,7 +162,7 @@ export const LAMP_NUMBERS = {
 type NumbersOf<T extends TraceNumbers> = { readonly [K in keyof T]: number };
 
 export type TraceSettings = NumbersOf<typeof MEDIUM_NUMBERS> &
-  NumbersOf<typeof ROOM_NUMBERS> &
+  NumbersOf<typeof ENVIRONMENT_NUMBERS> &
   NumbersOf<typeof POST_NUMBERS> &
   Readonly<{
     /** Whether light is scattered until it leaves the specimen, or once. */
@@ -190,7 +190,7 @@ function startsOf<T extends TraceNumbers>(numbers: T): NumbersOf<T> {
 export const START_TRACE: TraceSettings = {
   ...startsOf(MEDIUM_NUMBERS),
   isMultiple: true,
-  ...startsOf(ROOM_NUMBERS),
+  ...startsOf(ENVIRONMENT_NUMBERS),
   environment: "studio",
   lamps: START_LAMPS,
   ...startsOf(POST_NUMBERS),
@@ -210,7 +210,7 @@ export function withLamp(
 
 const PATH_SETTINGS: readonly (keyof TraceSettings)[] = [
   ...(Object.keys(MEDIUM_NUMBERS) as (keyof typeof MEDIUM_NUMBERS)[]),
-  ...(Object.keys(ROOM_NUMBERS) as (keyof typeof ROOM_NUMBERS)[]),
+  ...(Object.keys(ENVIRONMENT_NUMBERS) as (keyof typeof ENVIRONMENT_NUMBERS)[]),
   "isMultiple",
   "environment",
   "lamps",

@@ -1,12 +1,12 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import type { Lights } from "../bundle/generated/bundle";
-import { OWN_LIGHT } from "../gpu/room_light";
+import { OWN_LIGHT } from "../gpu/scene_light";
 import { initialState } from "./initial_state";
 import { setTo, withValue } from "./parameters/kinds";
 import { ENVIRONMENT } from "./parameters/light";
 import { START_TRACE } from "./path_trace_settings";
-import { roomLightOf } from "./stage_light";
+import { sceneLightOf } from "./stage_light";
 
 const manifest = sampleManifest(1);
 const { min, max } = manifest.specimen.bounds_um;
@@ -19,12 +19,12 @@ const lit = (lights: Lights) => ({ ...manifest, lights });
 
 describe("the light of a stage", () => {
   it("is the viewer's own light if no layer has lights", () => {
-    expect(roomLightOf(manifest)).toBe(OWN_LIGHT);
+    expect(sceneLightOf(manifest)).toBe(OWN_LIGHT);
     expect(initialState(manifest).trace).toBe(START_TRACE);
   });
 
   it("moves with the specimen: the strongest lamp is the key light, all others are joined to one fill light", () => {
-    const light = roomLightOf(
+    const light = sceneLightOf(
       lit({
         lamps: [
           { ...lamp, strength: 2, towards: [1, 0, 0], position_um: null },

@@ -3,7 +3,7 @@
  * frames. Pure.
  */
 import type { Lights, Manifest, StageLamp } from "../bundle/generated/bundle";
-import { asOneLamp, OWN_LIGHT, type RoomLight } from "../gpu/room_light";
+import { asOneLamp, OWN_LIGHT, type SceneLight } from "../gpu/scene_light";
 import type { Vec3 } from "../math/vec3";
 import { LAMP_REACH, type Lamp, START_TRACE, type TraceSettings } from "./path_trace_settings";
 
@@ -12,7 +12,7 @@ type Bounds = Manifest["specimen"]["bounds_um"];
 const DARK = [0, 0, 0] as const;
 
 /** Returns the light of all frames but the path-traced ones. */
-export function roomLightOf({ lights, specimen: { bounds_um } }: Manifest): RoomLight {
+export function sceneLightOf({ lights, specimen: { bounds_um } }: Manifest): SceneLight {
   if (lights === undefined) return OWN_LIGHT;
   const [key, ...others] = lights.lamps.map((lamp) => ({
     ...lamp,

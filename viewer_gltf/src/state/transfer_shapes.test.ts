@@ -202,7 +202,9 @@ describe("a shape from outside", () => {
     expect(faultOf({ ...TRIANGLE, gradients: [0.5, 1.5] })).toMatch(/gradients/);
     expect(faultOf({ ...TRIANGLE, tip: Number.NaN })).toMatch(/tip is NaN/);
     expect(faultOf({ ...TRIANGLE, color: [0, 2, 0] })).toMatch(/green is 2/);
-    expect(faultOf({ ...TRIANGLE, kind: "circle" as "triangle" })).toBe("kind is circle");
+    expect(faultOf({ ...TRIANGLE, kind: "circle" as "triangle" })).toBe(
+      "kind is circle, expected rectangle or triangle",
+    );
   });
 
   it("is drawn by its corners", () => {

@@ -71,11 +71,11 @@ class StereoPart implements Part, StereoFinder {
     host.panel.show(rememberedLens());
     host.display.setScreen(rememberedScreen());
     for (const action of rememberedEyes()) host.dispatch(action);
-    void canScan().then((isAble) => host.panel.learn({ canScan: isAble }));
+    void canScan().then((isAble) => host.panel.addFacts({ canScan: isAble }));
   }
 
   async afterOpening(): Promise<void> {
-    this.host.panel.learn(await this.found);
+    this.host.panel.addFacts(await this.found);
   }
 
   /** Loads the code of stereo while the page is idle, if stereo is available. */
@@ -93,29 +93,29 @@ class StereoPart implements Part, StereoFinder {
   }
 
   panel(view: PanelView): readonly PartSection[] {
-    const { state, isInRoom, panel, stereo } = this.host;
+    const { state, isInStereo, panel, stereo } = this.host;
     const { facts } = panel;
     const facing = {
       stereo: facts.stereo,
       split: stereo.kind === "headset" ? null : SPLIT,
       canScan: facts.canScan,
-      hasRoom: facts.hasRoom && !isInRoom,
+      hasRoom: facts.hasRoom && !isInStereo,
       faultOfCode,
     };
-    return stereoSections(state, { ...facing, isStereo: isInRoom }, view);
+    return stereoSections(state, { ...facing, isStereo: isInStereo }, view);
   }
 
   private toggleHeadset(): void {
-    const { stereo, panel, isInRoom } = this.host;
+    const { stereo, panel, isInStereo } = this.host;
     const { isAvailable, reason } = panel.facts.stereo;
-    if (isInRoom) stereo.end();
+    if (isInStereo) stereo.end();
     else if (isAvailable) void this.enter("immersive-vr");
     else this.host.announce(reason);
   }
 
   private toggleRoom(): void {
-    const { stereo, panel, isInRoom } = this.host;
-    if (isInRoom) stereo.end();
+    const { stereo, panel, isInStereo } = this.host;
+    if (isInStereo) stereo.end();
     else if (panel.facts.hasRoom) void this.enter("immersive-ar");
     else this.host.announce(NO_ROOM);
   }

@@ -37,7 +37,7 @@ class SurfacesPart implements Part, Form {
   }
 
   sync(state: ViewerState): void {
-    this.set.follow(state, this.host.focus.focusTiles);
+    this.set.sync(state, this.host.focus.focusTiles);
   }
 
   get isLoading(): boolean {
@@ -69,7 +69,7 @@ class SurfacesPart implements Part, Form {
     this.set.update(camera, width_px, height_px);
   }
 
-  dress(): void {
+  updateMaterials(): void {
     this.set.applyAllStyles();
   }
 

@@ -22,11 +22,11 @@ import type { ViewerState } from "../state/viewer_state";
 import { turnsOf } from "./draw_order";
 import type { SurfaceLoader } from "./gltf_loader";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
-import { type Face, faceTowards } from "./thin_rests";
+import { type Face, faceTowards } from "./thin_remnants";
 import { coarserFor, FINEST } from "./triangle_budget";
 
-/** Presence of a volume, 0 to 1, from which on the thin rests beside it are not drawn. */
-const REST_LIMIT = 0.5;
+/** Presence of a volume, 0 to 1, from which on the thin remnants beside it are not drawn. */
+const REMNANT_LIMIT = 0.5;
 
 const CLOSED = { tile: null, faces: new Map<string, Face>() };
 
@@ -138,7 +138,7 @@ export class SurfaceSet implements Surfaces {
     }
   }
 
-  follow(state: ViewerState, focusTiles: FocusTiles): void {
+  sync(state: ViewerState, focusTiles: FocusTiles): void {
     this.state = state;
     this.focusTiles = focusTiles;
     this.openTile(marchedTile(state, focusTiles));
@@ -227,8 +227,8 @@ export class SurfaceSet implements Surfaces {
     });
     paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
     const { open } = this;
-    const isOpen = open.tile !== null && this.options.presence(open.tile, id) >= REST_LIMIT;
-    surface.leaveRestsOut((isOpen && open.faces.get(tile.id)) || null);
+    const isOpen = open.tile !== null && this.options.presence(open.tile, id) >= REMNANT_LIMIT;
+    surface.hideRemnants((isOpen && open.faces.get(tile.id)) || null);
   }
 
   private openTile(id: string | null): void {

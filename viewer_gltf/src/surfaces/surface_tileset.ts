@@ -32,7 +32,7 @@ import { BlendedSurface, type SurfaceFrame } from "../render/blend_material";
 import type { TileProgress } from "../state/overview_progress";
 import { branchOf, leaveOut, putBack } from "./failed_branch";
 import type { SurfaceLoader } from "./gltf_loader";
-import { type Face, leaveRestsOut } from "./thin_rests";
+import { type Face, hideRemnants } from "./thin_remnants";
 import type { Coarser, Levels } from "./triangle_budget";
 
 const UM_PER_METRE = 1e6;
@@ -52,8 +52,8 @@ export type Surface = Readonly<{
   /** Number of triangles drawn when the surface is on screen. */
   triangles: number;
   blend: BlendedSurface;
-  /** Stops drawing the thin rests at a face; null: draws all triangles. */
-  leaveRestsOut: (face: Face | null) => void;
+  /** Stops drawing the thin remnants at a face; null: draws all triangles. */
+  hideRemnants: (face: Face | null) => void;
 }>;
 
 type PlacedMesh = Readonly<{ geometry: BufferGeometry; toWorld: Matrix4 }>;
@@ -277,10 +277,10 @@ export class SurfaceTileset {
         return meshes.reduce((sum, { geometry }) => sum + drawnTriangles(geometry), 0);
       },
       blend: new BlendedSurface(scene, list, this.frame),
-      leaveRestsOut: (face: Face | null) => {
+      hideRemnants: (face: Face | null) => {
         if (face === shownFace) return;
         shownFace = face;
-        for (const { geometry, toWorld } of meshes) leaveRestsOut(geometry, toWorld, face);
+        for (const { geometry, toWorld } of meshes) hideRemnants(geometry, toWorld, face);
       },
     };
     this.surfaces.set(scene, surface);

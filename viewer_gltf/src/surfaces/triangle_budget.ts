@@ -20,7 +20,7 @@ const ALL: readonly Coarser[] = Array.from({ length: MAX_LEVELS }, (_, leftOut) 
 ).flat();
 export const [FINEST] = ALL;
 /** Share of the budget that a finer choice must not exceed, so that levels do not alternate. */
-const ROOM = 0.8;
+const HEADROOM = 0.8;
 
 /** Estimated number of triangles if each tile is refined to an error. */
 export function trianglesAt(
@@ -47,6 +47,6 @@ export function coarserFor(
 ): Coarser {
   const usual = ALL.indexOf(before);
   const fits = (each: Coarser, i: number) =>
-    trianglesAt(tiles, target_px, each) <= (i < usual ? ROOM : 1) * most;
+    trianglesAt(tiles, target_px, each) <= (i < usual ? HEADROOM : 1) * most;
   return ALL.find(fits) ?? ALL[ALL.length - 1];
 }

@@ -15,7 +15,7 @@ class TapCardPart implements Part {
 
   constructor(private readonly host: PartHost) {
     host.panel.onShown(() => this.card?.update());
-    host.drawn.subscribe(() => this.card?.follow());
+    host.drawn.subscribe(() => this.card?.sync());
     host.doubleTapped.subscribe(() => {
       this.taps++;
       this.card?.close();

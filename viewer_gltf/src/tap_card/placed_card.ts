@@ -34,7 +34,7 @@ export class PlacedCard {
     const rest_ms = isByKey ? 0 : time_ms + DOUBLE_MS - performance.now();
     await new Promise((resolve) => setTimeout(resolve, Math.max(0, rest_ms)));
     const { host } = this;
-    if (number !== this.taps || tapped === null || host.isInRoom) return;
+    if (number !== this.taps || tapped === null || host.isInStereo) return;
     this.shown = tapped;
     const place = this.placeOf(tapped.point);
     if (place === null) this.shown = null;
@@ -56,14 +56,14 @@ export class PlacedCard {
   update(): void {
     const { host, shown } = this;
     if (shown === null) return;
-    if (host.state.tool === "measure" || host.isInRoom) this.close();
+    if (host.state.tool === "measure" || host.isInStereo) this.close();
     else this.card.update(tapCardOf(host.state, shown, host.undo.undoes));
   }
 
   /** Moves the card with the view, after every frame. */
-  follow(): void {
+  sync(): void {
     if (this.shown === null) return;
-    const place = this.host.isInRoom ? null : this.placeOf(this.shown.point);
+    const place = this.host.isInStereo ? null : this.placeOf(this.shown.point);
     if (place === null) this.close();
     else this.card.moveTo(place);
   }

@@ -97,7 +97,7 @@ export class Marches implements DrawnMarches {
    * Updates the march of a tile's loaded volumes to the state. Returns false if its bricks lack a
    * channel that is shown now.
    */
-  follow(resident: Resident, state: ViewerState): boolean {
+  sync(resident: Resident, state: ViewerState): boolean {
     const { shown } = resident.texture;
     if (shown === null) {
       resident.march?.dispose();
@@ -174,7 +174,7 @@ export class Marches implements DrawnMarches {
     const { drawn } = this;
     for (const { march } of drawn) boxes.add(march);
     const strength = state !== null && canBeShaded(state) ? state.depthShading : 0;
-    this.shading.follow(drawn, strength, clip, lamp);
+    this.shading.sync(drawn, strength, clip, lamp);
     this.frame.uDensity.value = state !== null && isTraced(state) ? state.trace.density : 1;
     for (const { march } of drawn) {
       this.shading.place(march);

@@ -3,8 +3,8 @@ import type { Size3 } from "../bundle/ktx2";
 import type { Vec3 } from "../math/vec3";
 
 /**
- * The part of a brick that counts as occupied: a surface passes, on average, through the middle of
- * its bricks.
+ * Shares of a brick's edge between which the brick counts as occupied. A surface passes, on average,
+ * through the middle of its bricks.
  */
 const [FROM, TO] = [0.25, 0.75];
 

@@ -39,7 +39,7 @@ class VolumesPart implements Part, Form {
 
   sync(state: ViewerState): void {
     const { focusTiles, mayRefine, hasOverview } = this.host.focus;
-    this.marched.follow(state, hasOverview ? wantedTiles(state, focusTiles) : [], mayRefine);
+    this.marched.sync(state, hasOverview ? wantedTiles(state, focusTiles) : [], mayRefine);
   }
 
   panel(): readonly PartSection[] {

@@ -257,7 +257,7 @@ export class TileMarch {
    * may differ.
    */
   setAppearances(appearances: readonly Appearance[]): boolean {
-    const differs = this.tables.follow(appearances);
+    const differs = this.tables.sync(appearances);
     this.define("TWO_D", this.tables.isTwoD ? 1 : null);
     this.endAtDisc(false);
     this.define("DISC", this.tables.isPartlyInDisc ? 1 : null);

@@ -75,9 +75,9 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
    * Follows the state until everything is loaded and faded in. Returns the largest number of bytes
    * on the way.
    */
-  async function follow(state: ViewerState, tiles: readonly string[]): Promise<number> {
+  async function sync(state: ViewerState, tiles: readonly string[]): Promise<number> {
     const wanted = wantedTiles(state, { ...NO_FOCUS, focusTile: tiles[0], near: new Set(tiles) });
-    set.follow(state, wanted, true);
+    set.sync(state, wanted, true);
     let most = set.bytes;
     await vi.waitFor(
       () => {
@@ -106,7 +106,7 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
       expect(state.channels.filter(({ shown }) => shown)).toHaveLength(4);
       const budget = FADING * (TILES + KEPT_TILES) * bytesOf(level, 4);
       makeSet(budget);
-      const most = await follow(state, all());
+      const most = await sync(state, all());
       expect(set.status()).toHaveLength(4 * TILES);
       expect(levelsNow()).toEqual(new Set([level])); // the finest level that fits
       expect(set.bytes).toBe(TILES * bytesOf(level, 4));
@@ -114,7 +114,7 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
       if (level === 3) return; // the coarsest level is always loaded
       set.dispose();
       makeSet(budget / 2);
-      expect(await follow(state, all())).toBeLessThanOrEqual(budget / 2);
+      expect(await sync(state, all())).toBeLessThanOrEqual(budget / 2);
       expect(levelsNow()).toEqual(new Set([level + 1]));
     },
   );
@@ -123,7 +123,7 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
     makeSet(FADING * (TILES + KEPT_TILES) * bytesOf(1, 4));
     const state = opened("all");
     const [tile] = all();
-    set.follow(
+    set.sync(
       state,
       wantedTiles(state, { ...NO_FOCUS, focusTile: tile, near: new Set([tile]) }),
       true,
@@ -148,7 +148,7 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
 
   it("is not needed to find the source of a volume", async () => {
     makeSet(0);
-    set.follow(opened("off"), [], true);
+    set.sync(opened("off"), [], true);
     expect(set.source("r0_c1", "B")).toBeNull();
     const [source, again] = await Promise.all([
       set.sourceOf("r0_c1", "B"),
@@ -170,11 +170,11 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
       );
     const state = opened("all");
     const [wanted] = wantedTiles(state, NO_FOCUS);
-    const follow = () => set.follow(state, [wanted], true);
+    const sync = () => set.sync(state, [wanted], true);
     const fails = async () => {
-      follow();
+      sync();
       await vi.waitFor(() => expect(faults).toHaveLength(4));
-      follow();
+      sync();
       expect(set.isLoading).toBe(false); // no retry without a request
       faults.length = 0;
       set.retryFailed();
@@ -184,7 +184,7 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
     without(".ktx2");
     await fails();
     vi.stubGlobal("fetch", fetch);
-    follow();
+    sync();
     await vi.waitFor(
       () => {
         set.advance(0.05);
@@ -201,11 +201,11 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
     for (const channel of ["B", "C", "D"]) {
       state = reduce(state, { type: "show", channel, shown: false });
     }
-    const mosts = [await follow(state, all())];
+    const mosts = [await sync(state, all())];
     const levels = [coarsestNow()];
     for (const channel of ["B", "C", "D"]) {
       state = reduce(state, { type: "show", channel, shown: true });
-      mosts.push(await follow(state, all()));
+      mosts.push(await sync(state, all()));
       levels.push(coarsestNow());
     }
     expect(Math.max(...mosts)).toBeLessThanOrEqual(budget);
@@ -218,7 +218,7 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
     makeSet(budget);
     const state = opened("tile");
     for (const tile of [...all(), ...all()]) {
-      const most = await follow(state, [tile]);
+      const most = await sync(state, [tile]);
       expect(levelsNow()).toEqual(new Set([0]));
       expect(most).toBeLessThanOrEqual(budget); // also while the tiles that were left fade out
       expect(set.bytes).toBeLessThanOrEqual(budget);
@@ -229,9 +229,9 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
   it("stays within the budget when all tiles follow a few that used all of it", async () => {
     const budget = FADING * (1 + KEPT_TILES) * bytesOf(0, 4);
     makeSet(budget);
-    for (const tile of all().slice(0, 3)) await follow(opened("tile"), [tile]);
+    for (const tile of all().slice(0, 3)) await sync(opened("tile"), [tile]);
     expect(set.bytes).toBe((1 + KEPT_TILES) * bytesOf(0, 4));
-    await follow(opened("all"), all());
+    await sync(opened("all"), all());
     expect(levelsNow()).toEqual(new Set([1]));
     expect(set.bytes).toBe(TILES * bytesOf(1, 4));
   });

@@ -54,7 +54,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     this.residents = new Residency(limits.bytes);
     this.bounds = new Map(bundle.manifest.tiles.map(({ id, bounds_um }) => [id, bounds_um]));
     const onList = () => {
-      if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
+      if (this.state !== null) this.sync(this.state, this.wanted, this.mayRefine);
       this.onChange();
     };
     this.channels = new ChannelLists(bundle, onList, onError);
@@ -178,7 +178,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
    *
    * @param mayRefine false while the gaze wanders, so that no finer levels are loaded
    */
-  follow(state: ViewerState, wanted: readonly WantedTile[], mayRefine: boolean): void {
+  sync(state: ViewerState, wanted: readonly WantedTile[], mayRefine: boolean): void {
     // A host that streams bricks sends a tile's bricks to one receiver only: to path tracing while
     // the march stands in.
     if (this.bricks !== null && this.state !== null && isTraced(this.state) !== isTraced(state)) {
@@ -214,12 +214,12 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     if (texture instanceof SharpenedTile) texture.sharpen();
   }
 
-  /** Limits the texture edge from the next `follow` on. */
+  /** Limits the texture edge from the next `sync` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
   }
 
-  /** Lets failed volumes be loaded again by the next `follow`. */
+  /** Lets failed volumes be loaded again by the next `sync`. */
   retryFailed(): void {
     this.channels.forgetFailed();
     for (const { texture } of this.residents.all) texture.retryFailed();
@@ -297,7 +297,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     }
     this.bricks?.refuse(tile);
     this.residents.drop(tile);
-    if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
+    if (this.state !== null) this.sync(this.state, this.wanted, this.mayRefine);
   }
 
   private canCome(channel: string, tile: string): boolean {
@@ -310,7 +310,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     const { state } = this;
     const resident = this.residents.get(tile);
     if (state === null || resident === undefined) return;
-    if (!this.marches.follow(resident, state)) this.replace(tile);
+    if (!this.marches.sync(resident, state)) this.replace(tile);
   }
 
   /** Releases all GPU resources; wanted volumes are loaded again. */

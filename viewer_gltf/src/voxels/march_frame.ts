@@ -14,7 +14,7 @@ import {
   Vector4,
 } from "three";
 import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
-import { GLOSS, OWN_LIGHT, type RoomLight } from "../gpu/room_light";
+import { GLOSS, OWN_LIGHT, type SceneLight } from "../gpu/scene_light";
 
 /**
  * Largest number of steps of a ray in a moving view, for any size of the volume and number of
@@ -44,9 +44,9 @@ export function marchLight() {
  *
  * @param toEye from the axes of the lamps to those of the eye
  */
-export function lightByRoom(
+export function lightByScene(
   light: MarchLight,
-  { key, fill, sky, ground }: RoomLight,
+  { key, fill, sky, ground }: SceneLight,
   toEye: Matrix4,
 ): void {
   light.uLight.value.set(...key.towards).transformDirection(toEye);
@@ -101,7 +101,7 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
   noise.minFilter = noise.magFilter = NearestFilter;
   noise.needsUpdate = true;
   const light = marchLight();
-  lightByRoom(light, OWN_LIGHT, new Matrix4());
+  lightByScene(light, OWN_LIGHT, new Matrix4());
   return {
     ...light,
     uSceneDepth: { value: depth },

@@ -90,7 +90,7 @@ export class MarchTables {
    * Takes over colours and tables, by uploading a few kilobytes. Returns whether the visible part
    * may differ.
    */
-  follow(appearances: readonly Appearance[]): boolean {
+  sync(appearances: readonly Appearance[]): boolean {
     const { uniforms } = this;
     const rows = this.lut.image.data as Uint8Array;
     let differs = false;

@@ -13,7 +13,7 @@ export function howItWorks(setting: Setting): string {
 }
 /** Number of times that the card is shown on a device. */
 const TIMES_SHOWN = 3;
-const STORAGE_KEY = "stereocell-told";
+const STORAGE_KEY = "stereocell-introductions";
 
 /** Whether the card is due, which also counts this time. */
 export function isIntroductionDue(): boolean {

@@ -218,7 +218,7 @@ export class Hands {
     this.gaze = gazeOf(head);
     this.state = state;
     this.tiles.tiles = shownTiles(this.options.tiles, state.isolated);
-    this.tiles.follow(state);
+    this.tiles.sync(state);
     this.controllers.update(xr.getFrame() ?? null, xr.getReferenceSpace());
     for (const event of this.controllers.take()) this.grips.handle(event);
     const hasTouched = this.grips.followFingers(this.gestures.splice(0), state);

@@ -54,7 +54,7 @@ function at([, tab, page, , variant]: TestedPage): LookingPerson {
 const CHANNELS = PAGES[1];
 
 /** The numbers of requests and changes that one control has caused. */
-type Effect = Readonly<{ id: string; wishes: number; changes: number }>;
+type Effect = Readonly<{ id: string; requests: number; changes: number }>;
 
 function effectsOf(
   page: TestedPage,
@@ -64,13 +64,13 @@ function effectsOf(
   return ids.map((id) => {
     const person = at(page);
     act(person, id);
-    const { changes, wishes } = person;
+    const { changes, requests } = person;
     person.dispose();
-    return { id, wishes: wishes.length, changes };
+    return { id, requests: requests.length, changes };
   });
 }
 const moreThanOne = (all: readonly Effect[]) =>
-  all.filter(({ wishes, changes }) => wishes > 1 || changes > 1);
+  all.filter(({ requests, changes }) => requests > 1 || changes > 1);
 
 describe("every control of every page", () => {
   it("is tested", () => {
@@ -87,7 +87,9 @@ describe("every control of every page", () => {
         person.rest(7.5);
       });
       expect(moreThanOne(all)).toEqual([]);
-      expect(Math.max(...all.map(({ changes, wishes }) => changes + wishes))).toBeGreaterThan(0);
+      expect(Math.max(...all.map(({ changes, requests }) => changes + requests))).toBeGreaterThan(
+        0,
+      );
     },
   );
 
@@ -190,7 +192,7 @@ describe("a gaze that opens or closes the panel", () => {
     expect(person.hands.pointed).toMatch(/^panel:/);
     person.rest(6);
     expect(person.hands.panel.isOpen).toBe(true);
-    expect([person.changes, person.wishes]).toEqual([1, []]);
+    expect([person.changes, person.requests]).toEqual([1, []]);
   });
 
   it("does not fire when stereo begins with the gaze on the button", () => {
@@ -201,7 +203,7 @@ describe("a gaze that opens or closes the panel", () => {
     person.rest(6);
     // The bar has moved to where the head faces.
     expect(person.hands.pointed).toMatch(/^panel:bar-/);
-    expect([person.hands.panel.isOpen, person.wishes]).toEqual([false, []]);
+    expect([person.hands.panel.isOpen, person.requests]).toEqual([false, []]);
     person.lookUp();
     person.lookAt("opener");
     person.rest(2);
@@ -213,7 +215,7 @@ describe("a gaze that opens or closes the panel", () => {
     person.lookAt("close");
     person.rest(7.5);
     expect(person.hands.panel.isOpen).toBe(false);
-    expect([person.changes, person.wishes]).toEqual([1, []]);
+    expect([person.changes, person.requests]).toEqual([1, []]);
   });
 
   it("leaves the panel open after a double press on its button", () => {
@@ -222,7 +224,7 @@ describe("a gaze that opens or closes the panel", () => {
     person.press();
     person.press(180);
     expect(person.hands.panel.isOpen).toBe(true);
-    expect(person.wishes).toEqual([]);
+    expect(person.requests).toEqual([]);
   });
 });
 
@@ -231,9 +233,9 @@ describe("a press that comes just after the dwell", () => {
     const person = at(CHANNELS);
     person.lookAt("c0/shown");
     person.rest(1.6);
-    expect(person.wishes).toHaveLength(1);
+    expect(person.requests).toHaveLength(1);
     person.press(100);
-    expect(person.wishes).toHaveLength(1);
+    expect(person.requests).toHaveLength(1);
   });
 });
 
@@ -245,11 +247,11 @@ describe("the button of a WebXR session", () => {
     person.lookAt("c0/shown");
     person.press();
     person.press(180);
-    expect(person.wishes).toEqual([{ type: "show", channel: "c0", shown: false }]);
+    expect(person.requests).toEqual([{ type: "show", channel: "c0", shown: false }]);
     person.rest(6);
-    expect(person.wishes).toHaveLength(1);
+    expect(person.requests).toHaveLength(1);
     person.press();
-    expect(person.wishes).toHaveLength(2);
+    expect(person.requests).toHaveLength(2);
   });
 });
 
@@ -259,7 +261,7 @@ describe("a second press after a while", () => {
     person.lookAt("c0/shown");
     person.press();
     person.press(600);
-    expect(person.wishes).toEqual([
+    expect(person.requests).toEqual([
       { type: "show", channel: "c0", shown: false },
       { type: "show", channel: "c0", shown: true },
     ]);

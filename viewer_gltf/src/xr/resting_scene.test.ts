@@ -112,7 +112,7 @@ describe("an object under a resting gaze", () => {
     showing(person, "c0/8");
     person.rest(LONG_S);
     expect(person.hands.pointed).toBe("tile:r0_c1/c0/8");
-    expect(person.wishes).toEqual([]);
+    expect(person.requests).toEqual([]);
   });
 
   it("is chosen once", () => {
@@ -121,7 +121,7 @@ describe("an object under a resting gaze", () => {
     person.lookUp();
     person.lookAtTile("tile:r0_c1");
     person.rest(LONG_S);
-    expect(person.wishes).toHaveLength(1);
+    expect(person.requests).toHaveLength(1);
   });
 });
 
@@ -185,9 +185,9 @@ describe("the bar under a resting gaze", () => {
     person.rest(LONG_S);
     // One for the undoing, one because Undo disappears from the bar.
     expect(person.changes).toBeLessThanOrEqual(2);
-    expect(person.wishes.filter((wish) => JSON.stringify(wish).includes("restore"))).toHaveLength(
-      1,
-    );
+    expect(
+      person.requests.filter((request) => JSON.stringify(request).includes("restore")),
+    ).toHaveLength(1);
   });
 
   it.each(["leave", "close", "up"])("changes one thing while the menu is open: %s", (id) => {
@@ -195,9 +195,9 @@ describe("the bar under a resting gaze", () => {
     person.open("channels");
     person.lookAt(id);
     person.changes = 0;
-    person.wishes.length = 0;
+    person.requests.length = 0;
     person.rest(LONG_S);
     expect(person.changes).toBe(1);
-    expect(person.wishes.length).toBeLessThanOrEqual(1);
+    expect(person.requests.length).toBeLessThanOrEqual(1);
   });
 });

@@ -109,7 +109,7 @@ export class Stereo {
    * stereo, otherwise one.
    */
   followScreen(eyes: Eyes, camera: PerspectiveCamera, focus: Vector3): void {
-    this.screen.follow(eyes, camera, focus, this.eyes.distance_m * this.eyes.strength);
+    this.screen.sync(eyes, camera, focus, this.eyes.distance_m * this.eyes.strength);
   }
 
   setEyes(eyes: EyeSettings): void {
@@ -157,7 +157,7 @@ export class Stereo {
     const { running } = this.split;
     if (running === null) return null;
     running.update();
-    eyes.follow(running.eyes.map(({ camera, viewport }) => [camera, viewport]));
+    eyes.sync(running.eyes.map(({ camera, viewport }) => [camera, viewport]));
     return running.camera;
   }
 

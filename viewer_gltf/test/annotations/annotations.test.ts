@@ -78,7 +78,7 @@ describeInChromium("marks", () => {
     });
 
   it("have a scale bar that is correct within a pixel at any zoom and from any side", async () => {
-    const said = new Set<string>();
+    const texts = new Set<string>();
     for (const [position, target] of [
       [
         [0, 0, 2.2],
@@ -101,9 +101,9 @@ describeInChromium("marks", () => {
       const scale = await page.evaluate(() => window.bench?.scale());
       expect(Math.abs((scale?.shown_px ?? 0) - (scale?.true_px ?? 99))).toBeLessThan(1);
       expect(scale?.shown_px).toBeGreaterThan(60);
-      said.add(scale?.text ?? "");
+      texts.add(scale?.text ?? "");
     }
-    expect(said.size).toBeGreaterThan(2);
+    expect(texts.size).toBeGreaterThan(2);
   });
 
   it("show the true distance of two measured points", async () => {
@@ -263,8 +263,8 @@ describeInChromium("marks", () => {
     const px_per_rad = HEIGHT / 2 / Math.tan((20 * Math.PI) / 180);
     for (const angle of angles) expect(angle * px_per_rad).toBeCloseTo(LABEL_PX, 1);
     await look([0, 0, 2], [0, 0, 0], { isStereo: true });
-    const inRoom = (await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0;
-    expect(inRoom).toBeCloseTo(STEREO_TEXT * LABEL_HEIGHT, 5);
+    const inStereo = (await page.evaluate(() => window.bench?.label()))?.angle_rad ?? 0;
+    expect(inStereo).toBeCloseTo(STEREO_TEXT * LABEL_HEIGHT, 5);
   });
 
   it("have a handle that moves a face with the pointer, while the camera stays", async () => {
@@ -292,25 +292,25 @@ describeInChromium("marks", () => {
     // A um is 1.2 mm in the scene, and the specimen's centre is at the origin.
     const gaze = (x_um: number) =>
       look([0, 0, 1.6], [(x_um - 500) * 1.2e-3, 0, 0], { isStereo: true });
-    const meet = () => page.evaluate(() => window.bench?.meet());
+    const handleUnderGaze = () => page.evaluate(() => window.bench?.meet());
     await gaze(903);
-    const met = await meet();
+    const grip = await handleUnderGaze();
     // The cut existed before stereo began, so only a button grabs the handle.
-    expect(met).toMatchObject({ key: "handle:x-max", hold: "carry", isGlance: true });
-    expect(met?.distance_m).toBeCloseTo(Math.hypot(1.6, 0.48), 3);
+    expect(grip).toMatchObject({ key: "handle:x-max", hold: "carry", isGlance: true });
+    expect(grip?.distance_m).toBeCloseTo(Math.hypot(1.6, 0.48), 3);
     await gaze(250);
-    expect(await meet()).toBeNull();
+    expect(await handleUnderGaze()).toBeNull();
     await gaze(700);
     await page.evaluate(() => window.bench?.carry("handle:x-max"));
     expect((await stateNow()).clip.box?.max[0]).toBeCloseTo(700, 3);
     await gaze(703);
-    expect(await meet()).toMatchObject({ key: "handle:x-max", isGlance: false });
+    expect(await handleUnderGaze()).toMatchObject({ key: "handle:x-max", isGlance: false });
     await page.evaluate(() => {
       window.bench?.dispatch({ type: "set-clip", clip: { box: null, plane: null } });
       window.bench?.carry("handle:x-max");
     });
     expect((await stateNow()).clip.box).toBeNull();
-    expect(await meet()).toBeNull();
+    expect(await handleUnderGaze()).toBeNull();
   });
 
   it("name the part under the gaze once the gaze rests", async () => {

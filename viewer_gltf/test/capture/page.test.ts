@@ -52,8 +52,8 @@ describeInChromium("what the page saves", () => {
     ]);
     // A reduced copy of the image equals the screen, except for announcements over the view.
     await page().evaluate(() => {
-      const said = document.querySelector<HTMLElement>(".said");
-      if (said !== null) said.style.visibility = "hidden";
+      const announced = document.querySelector<HTMLElement>(".announcement");
+      if (announced !== null) announced.style.visibility = "hidden";
     });
     const screen = await page().screenshot({ clip: stage ?? undefined });
     const differing = await page().evaluate(
@@ -143,14 +143,14 @@ describeInChromium("what the page saves", () => {
 describeInChromium("a traced picture that the page saves", () => {
   const stand = prepareStand({ viewport: { width: 120, height: 96 } });
   const page = () => stand.viewer.page;
-  const said = () => page().locator("[data-said]").textContent();
+  const announced = () => page().locator("[data-announcement]").textContent();
 
   it("gathers light in each part until it is clear, and reports its progress", async () => {
     await stand.open("&mode=traced&quality=low#v=1&light=many:false");
     await stand.viewer.settled();
     await page().evaluate(() => {
       const words = new Set<string>();
-      const line = document.querySelector("[data-said]");
+      const line = document.querySelector("[data-announcement]");
       if (line === null) throw new Error("nothing says anything");
       new MutationObserver(() => words.add(line.textContent ?? "")).observe(line, {
         childList: true,
@@ -175,8 +175,8 @@ describeInChromium("a traced picture that the page saves", () => {
     await stand.open("&mode=traced#v=1&light=many:false");
     await stand.viewer.settled();
     await page().keyboard.press('"');
-    await expect.poll(said).toContain("samples of light");
+    await expect.poll(announced).toContain("samples of light");
     await page().keyboard.press('"');
-    await expect.poll(said).toBe("Saving the picture was cancelled.");
+    await expect.poll(announced).toBe("Saving the picture was cancelled.");
   });
 });

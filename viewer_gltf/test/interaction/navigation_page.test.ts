@@ -80,7 +80,9 @@ describeInChromium("a moved and zoomed view", () => {
     await page().mouse.dblclick(stage.x + 2, stage.y + stage.height / 2);
     await stand.viewer.still();
     expect(await look()).toEqual(whole);
-    expect(await page().locator("[data-said]").textContent()).toBe("There is nothing to fly to.");
+    expect(await page().locator("[data-announcement]").textContent()).toBe(
+      "There is nothing to fly to.",
+    );
   });
 
   it("flies to a place that is tapped twice by a finger that rolls slightly", async () => {

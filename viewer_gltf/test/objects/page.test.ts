@@ -247,7 +247,7 @@ describeInChromium("the objects of a label map", () => {
       await stand.viewer.drawn(2);
     }
     await expect.poll(async () => (await view())?.picked).toBe(ahead);
-    expect((await stand.viewer.snapshot()).told).toContain(`Object ${labelOf(ahead)}`);
+    expect((await stand.viewer.snapshot()).stereoNotices).toContain(`Object ${labelOf(ahead)}`);
     await page.waitForTimeout(2500); // the gaze still rests there, so the card stays
     expect((await view()).picked).toBe(ahead);
     await page.keyboard.press("Control+z");
@@ -325,7 +325,7 @@ describeInChromium("the objects of a label map", () => {
     await expect
       .poll(async () => {
         await page.locator('[data-control="save-objects"]').click();
-        return page.locator("[data-said]").innerText();
+        return page.locator("[data-announcement]").innerText();
       })
       .toContain("Saved");
     const parts: Buffer[] = [];

@@ -32,11 +32,11 @@ describeInChromium("the words about a visit without a network", () => {
     viewer = new ViewerPage(await browser.context.newPage());
     await viewer.page.addInitScript(() => {
       localStorage.setItem("stereocell-open", "channels more volumes tiles");
-      const said: string[] = [];
-      Object.assign(window, { said });
+      const announced: string[] = [];
+      Object.assign(window, { announced });
       new MutationObserver(() => {
-        const text = document.querySelector("[data-said]")?.textContent ?? "";
-        if (/offline/.test(text) && said.at(-1) !== text) said.push(text);
+        const text = document.querySelector("[data-announcement]")?.textContent ?? "";
+        if (/offline/.test(text) && announced.at(-1) !== text) announced.push(text);
       }).observe(document, { childList: true, subtree: true, characterData: true });
     });
     await viewer.open(`${host.address}/?quality=low&mode=tile&switch=9&view=front#v=1&depth=0`);
@@ -53,8 +53,8 @@ describeInChromium("the words about a visit without a network", () => {
     await rm(root, { recursive: true, force: true });
   });
 
-  const said = () =>
-    viewer.page.evaluate(() => (window as unknown as { said: readonly string[] }).said);
+  const announced = () =>
+    viewer.page.evaluate(() => (window as unknown as { announced: readonly string[] }).announced);
   const offline = () => viewer.page.evaluate(() => document.documentElement.dataset.offline);
   const notices = async () => (await viewer.snapshot()).state.notices;
   const tiles = async () => (await viewer.snapshot()).state.tiles.map(({ id }) => id);
@@ -75,13 +75,13 @@ describeInChromium("the words about a visit without a network", () => {
 
   it("promise every tile after each was shown, and each shows without a network", async () => {
     const all = await tiles();
-    const first = `Kept for offline: the overview and 1 of ${all.length} tiles. Each tile that you look at from near is kept, too.`;
-    await expect.poll(said).toEqual([first]);
+    const first = `Kept for offline: the overview and 1 of ${all.length} tiles. A tile is also kept once you have looked at it from near.`;
+    await expect.poll(announced).toEqual([first]);
     expect(await offline()).toBe("partly");
     const seen = new Map<string, Picture>();
     for (const tile of all) seen.set(tile, await visit(tile));
     await expect.poll(offline).toBe("ready");
-    expect(await said()).toEqual([first, expect.stringMatching(/^Ready offline: /)]);
+    expect(await announced()).toEqual([first, expect.stringMatching(/^Ready offline: /)]);
 
     await viewer.page.waitForTimeout(1000); // the address then contains the last view
     const atLast = await takePicture(viewer.page);
@@ -96,7 +96,7 @@ describeInChromium("the words about a visit without a network", () => {
     }
     expect(await notices()).toEqual([]);
     expect(host.requests.length).toBe(asked);
-    expect(await said()).toEqual([]); // an earlier visit has announced it
+    expect(await announced()).toEqual([]); // an earlier visit has announced it
   });
 
   it("name the number of kept tiles; elsewhere the page reports that it is offline, until it is online", async () => {

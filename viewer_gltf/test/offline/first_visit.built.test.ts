@@ -59,20 +59,21 @@ describeInChromium("a first visit", () => {
     const viewer = new ViewerPage(await browser.context.newPage());
     const { page } = viewer;
     await page.addInitScript(() => {
-      const said: string[] = [];
-      Object.assign(window, { said });
+      const announced: string[] = [];
+      Object.assign(window, { announced });
       new MutationObserver(() => {
-        const text = document.querySelector("[data-said]")?.textContent ?? "";
-        if (text !== "" && said.at(-1) !== text) said.push(text);
+        const text = document.querySelector("[data-announcement]")?.textContent ?? "";
+        if (text !== "" && announced.at(-1) !== text) announced.push(text);
       }).observe(document, { childList: true, subtree: true, characterData: true });
     });
-    const said = () => page.evaluate(() => (window as unknown as { said: string[] }).said);
+    const announced = () =>
+      page.evaluate(() => (window as unknown as { announced: string[] }).announced);
     const started = Date.now();
     await viewer.open(`${gate.address}/?quality=low`);
     await viewer.settled();
     const before = await takePicture(page);
     await expect
-      .poll(said, { timeout: VISIT_MS - (Date.now() - started) })
+      .poll(announced, { timeout: VISIT_MS - (Date.now() - started) })
       .toContainEqual(expect.stringMatching(/^(Ready|Kept for) offline: /));
 
     gate.shut();
@@ -86,7 +87,7 @@ describeInChromium("a first visit", () => {
     expect(host.requests.length).toBe(asked);
     expect(before.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     expect(difference(before, after)).toBeLessThan(SAME);
-    expect(await said()).toEqual([]); // the first visit has announced it
+    expect(await announced()).toEqual([]); // the first visit has announced it
     expect(await missing(page)).toEqual([]);
   });
 });

@@ -37,23 +37,23 @@ describeInChromium("the viewer in another page", () => {
   async function open() {
     const { page } = stand.viewer;
     await page.goto(holder);
-    const told = page.locator("#told");
-    await expect.poll(() => told.textContent()).toMatch(/^Shown: F_x20_body/);
-    return { page, told, frame: page.frameLocator("#viewer") };
+    const status = page.locator("#status");
+    await expect.poll(() => status.textContent()).toMatch(/^Shown: F_x20_body/);
+    return { page, status, frame: page.frameLocator("#viewer") };
   }
 
   it("is notified of changes and makes changes, without a panel", async () => {
-    const { page, told, frame } = await open();
+    const { page, status, frame } = await open();
     expect(await frame.locator(".panel").isVisible()).toBe(false);
     expect(await frame.locator(".stage canvas").isVisible()).toBe(true);
     await page.locator("#toggle").click();
-    await expect.poll(() => told.textContent()).not.toMatch(/F_x20_body/);
+    await expect.poll(() => status.textContent()).not.toMatch(/F_x20_body/);
     await page.locator("#toggle").click();
-    await expect.poll(() => told.textContent()).toMatch(/F_x20_body/);
+    await expect.poll(() => status.textContent()).toMatch(/F_x20_body/);
   });
 
   it("rejects invalid requests, and ignores other pages", async () => {
-    const { page, told } = await open();
+    const { page, status } = await open();
     const send = (state: unknown) =>
       page.evaluate((asked) => {
         const frame = document.querySelector<HTMLIFrameElement>("#viewer");
@@ -61,8 +61,8 @@ describeInChromium("the viewer in another page", () => {
       }, state);
     await send({ channels: { Balls: { opacity: 7 } } });
     await expect
-      .poll(() => told.textContent())
-      .toBe("channels.Balls.opacity: found 7, expected 0 to 1");
+      .poll(() => status.textContent())
+      .toBe("channels.Balls.opacity is 7, expected 0 to 1");
     // the frame itself has another origin than the page that may send requests
     const inner = page.frames().find((each) => each.url().includes("embed="));
     await inner?.evaluate(() =>

@@ -53,7 +53,7 @@ describeInChromium("a faulty bundle", () => {
     stand.host.overrides.set(`/bundle/${path}`, { status: 200, body });
     expect(await onlyBalls()).toBeGreaterThan(0);
     expect(await notices()).toEqual([
-      `${path}: found ${body.length} bytes, expected ${whole.length} (a broken upload?)`,
+      `${path}: found ${body.length} bytes, expected ${whole.length}: upload the file again`,
     ]);
   });
 

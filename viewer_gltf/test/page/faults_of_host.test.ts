@@ -55,19 +55,19 @@ describeInChromium("a fault between host and page", () => {
   it("a manifest that is cut short is reported as such", async () => {
     const text = JSON.stringify(stand.manifest);
     expect(await fatalText(text.slice(0, text.length / 2))).toContain(
-      "manifest.json: the JSON is broken or cut short (",
+      "manifest.json: found damaged or incomplete JSON (",
     );
   });
 
   it("a manifest of a newer format is reported with both versions", async () => {
     expect(await fatalText(JSON.stringify({ ...stand.manifest, version: 2 }))).toContain(
-      "manifest.json: version: this viewer reads version 1, found 2; open the bundle with the viewer",
+      "manifest.json: version is 2, expected 1: open the bundle with the viewer",
     );
   });
 
   it("a bundle without channels is reported in one line", async () => {
     expect(await fatalText(JSON.stringify({ ...stand.manifest, channels: [] }))).toContain(
-      "manifest.json: channels: the bundle holds none, so nothing can be shown",
+      "manifest.json: channels is empty, expected at least one channel: build the bundle again",
     );
   });
 
@@ -89,7 +89,7 @@ describeInChromium("a fault between host and page", () => {
     await stand.viewer.drawVolume("Block", true);
     await stand.viewer.chooseMode("all");
     expect((await notices()).join()).toContain(
-      `${path}: found 100 bytes, expected ${whole.length} (a broken upload?)`,
+      `${path}: found 100 bytes, expected ${whole.length}: upload the file again`,
     );
     // the volume of the other tile
     expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);
@@ -283,7 +283,7 @@ describeInChromium("a fault between host and page", () => {
     gate.shut();
     const starved = await starve(
       viewer,
-      /^The host .* can't be reached, or forbids this page: not all files/,
+      /^The host .* can't be reached, or forbids this page: some files/,
     );
     gate.open();
     await viewer.page.locator("[data-action=retry]").click();

@@ -38,9 +38,9 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
 
   /** Returns the number of messages in a time, in both directions. */
   const heardIn = (duration_ms: number) => async () => {
-    const before = kernel.heard;
+    const before = kernel.messageCount;
     await new Promise((resolve) => setTimeout(resolve, duration_ms));
-    return kernel.heard - before;
+    return kernel.messageCount - before;
   };
   /** Moves the eye, and waits until the page has moved it and no more messages pass. */
   const moveTo = async (eye_um: string, target_um: string) => {
@@ -125,7 +125,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     const front = await open();
     await front.viewer();
     await moveTo("(30, 40, 50)", "(4, -4, 2)");
-    const asked = () => kernel.told.filter((text) => text.includes('"ask":"')).length;
+    const asked = () => kernel.received.filter((text) => text.includes('"ask":"')).length;
     await inPython("len(viewer._picture) > 100").toBe(true);
     const before = asked();
     // the output with the image is shown while the viewer is not
@@ -140,7 +140,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     const look = await frame.evaluate(() => window.stereocell?.snapshot().look);
     expect(look).toBeDefined();
     // images may be sent, but no files
-    const files = kernel.told.slice(before).filter((text) => /"ask":"(file|page)"/.test(text));
+    const files = kernel.received.slice(before).filter((text) => /"ask":"(file|page)"/.test(text));
     expect(new Set(files).size).toBe(files.length);
     await front.stop();
   });
@@ -159,7 +159,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
       const state = () => frame.evaluate(() => window.stereocell?.snapshot().state);
       await expect.poll(async () => (await state())?.mode).toBe("traced");
       await expect
-        .poll(() => kernel.told.some((text) => text.includes("environments/")))
+        .poll(() => kernel.received.some((text) => text.includes("environments/")))
         .toBe(true);
       await frame.evaluate(() => window.stereocell?.settled());
       expect((await state())?.notices).toEqual([]);

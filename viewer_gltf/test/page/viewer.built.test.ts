@@ -209,7 +209,7 @@ describeInChromium("the viewer", () => {
     const body = JSON.stringify({ ...stand.manifest, version: 99 });
     stand.host.overrides.set("/bundle/manifest.json", { status: 200, body });
     const text = await fatalText(`${stand.host.address}/app/?bundle=../bundle/`);
-    expect(text).toContain("this viewer reads version 1, found 99");
+    expect(text).toContain("version is 99, expected 1");
   });
 
   it("reports on the page that a file is no JSON", async () => {

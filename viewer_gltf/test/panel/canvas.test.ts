@@ -200,7 +200,7 @@ describeInChromium("the panel in the scene", () => {
     await hands().tapOn("back");
     const why = REFUSED.back;
     const commands = await hands().page.evaluate(() => window.hands.commands);
-    expect([(await hands().status()).told, commands]).toEqual([[why], []]);
+    expect([(await hands().status()).notices, commands]).toEqual([[why], []]);
     const [aside, up] = await hands().page.evaluate(() => window.hands.noticeAt());
     expect(aside).toBeCloseTo(0);
     // notices on the lower part of the panel must not be too low for a head
@@ -208,28 +208,28 @@ describeInChromium("the panel in the scene", () => {
     expect(up).toBeGreaterThan(-20.1);
     await picture("refusal");
     await hands().wait(5);
-    expect((await hands().status()).told).toEqual([why]);
+    expect((await hands().status()).notices).toEqual([why]);
     await hands().wait(1.1);
-    expect((await hands().status()).told).toEqual([]);
+    expect((await hands().status()).notices).toEqual([]);
   });
 
   it("leaves a notice in the direction of the head at its appearance", async () => {
     const fault = "channels/c0/r0_c0/lod0.glb: not found (404). The other tiles go on.";
-    const tell = (text: string) => hands().page.evaluate((t) => window.hands.tell(t), text);
+    const announce = (text: string) => hands().page.evaluate((t) => window.hands.announce(t), text);
     const noticeAt = () => hands().page.evaluate(() => window.hands.noticeAt());
     await hands().gazeOnly();
     await hands().lookAt([0, 0, -1]);
-    await tell(fault);
+    await announce(fault);
     await picture("notice");
     await hands().lookAt([0.3, 0, -1]);
     const [aside] = await noticeAt();
     expect(aside).toBeCloseTo((-Math.atan(0.3) * 180) / Math.PI);
-    await tell("Another comes where the head looks now.");
+    await announce("Another comes where the head looks now.");
     expect((await noticeAt())[0]).toBeCloseTo(0);
-    expect((await hands().status()).told).toHaveLength(2);
+    expect((await hands().status()).notices).toHaveLength(2);
     await picture("notices");
     await hands().wait(12.2);
-    expect((await hands().status()).told).toEqual([]);
+    expect((await hands().status()).notices).toEqual([]);
   });
 
   it("is painted only when its content changes", async () => {

@@ -14,7 +14,7 @@ describeInChromium("the view", () => {
   const message = () => page().locator("[data-view-message]");
   const backButton = () => page().locator('[data-action="way-back"]');
   const offer = () => page().locator('[data-action="offer"]');
-  const announced = () => page().locator("[data-said]").textContent();
+  const announced = () => page().locator("[data-announcement]").textContent();
   const state = async () => (await stand.viewer.snapshot()).state;
   const press = (...keys: readonly string[]) =>
     keys.reduce((before, key) => before.then(() => page().keyboard.press(key)), Promise.resolve());

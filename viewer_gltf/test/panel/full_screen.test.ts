@@ -37,7 +37,7 @@ describeInChromium("the full screen", () => {
     await stand.open();
     expect(await button().isVisible()).toBe(false);
     await page().keyboard.press("Shift+Enter");
-    const announced = () => page().locator("[data-said]").textContent();
+    const announced = () => page().locator("[data-announcement]").textContent();
     await expect.poll(announced).toMatch(/full screen/);
   });
 });

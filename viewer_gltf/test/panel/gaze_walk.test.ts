@@ -24,12 +24,12 @@ describeInChromium("by gaze alone", () => {
           };
           /** All visible effects of a response. */
           const seen = () => {
-            const { told, position, scale, ...status } = hands.status();
+            const { notices, position, scale, ...status } = hands.status();
             // Undo disappears by itself, and the button for the next page has the number of the
             // page in its label
             const regions = status.labels.filter((label) => !label.startsWith("Undo the last"));
             const asked = [hands.actions.length, hands.commands.length, hands.leaves];
-            return JSON.stringify([regions, told, position, scale, asked]);
+            return JSON.stringify([regions, notices, position, scale, asked]);
           };
           const regions = () => hands.status().regions;
           const ofBar = new Set(["leave", "close", "more", "up", "undo-choice"]);

@@ -53,10 +53,18 @@ async function walk(stand: Stand, only = "") {
     };
     /** All visible effects of a response. *Undo* disappears by itself, so it does not count. */
     const seen = () => {
-      const { state, told, specimenAt, specimenTurn, isStereo } = api.snapshot();
+      const { state, stereoNotices, specimenAt, specimenTurn, isStereo } = api.snapshot();
       const onPage = [...document.querySelectorAll("input")].map((each) => each.checked);
       const labels = menu().flatMap(({ id, label }) => (id === UNDO ? [] : [[id, label]]));
-      return JSON.stringify([state, told, specimenAt, specimenTurn, isStereo, labels, onPage]);
+      return JSON.stringify([
+        state,
+        stereoNotices,
+        specimenAt,
+        specimenTurn,
+        isStereo,
+        labels,
+        onPage,
+      ]);
     };
     const gaze = (id: string) => {
       lookAt(id);

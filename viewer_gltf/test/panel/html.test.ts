@@ -138,7 +138,7 @@ describeInChromium("the panel", () => {
     const press = (key: string) => page().keyboard.press(key);
     await press("o");
     expect((await first()).opacity).toBeCloseTo(0.95, 5);
-    expect(await page().locator("[data-said]").textContent()).toBe("F body: opacity 95 %");
+    expect(await page().locator("[data-announcement]").textContent()).toBe("F body: opacity 95 %");
     await press("m");
     expect((await state()).mode).toBe("tile");
     await press("b");
@@ -148,7 +148,7 @@ describeInChromium("the panel", () => {
     await press(".");
     expect((await box())?.min).toEqual(before?.min);
     expect((await box())?.max[2]).toBeGreaterThan(before?.max[2] ?? Number.NaN);
-    expect(await page().locator("[data-said]").textContent()).toMatch(/^Box: z to .+ µm$/);
+    expect(await page().locator("[data-announcement]").textContent()).toMatch(/^Box: z to .+ µm$/);
     await press("h");
     expect(await page().locator(".panel .body").isVisible()).toBe(false);
     await press("h");
@@ -211,7 +211,7 @@ describeInChromium("the panel", () => {
 
   it("cuts an isolated tile at its own middle, and reports an empty cut", async () => {
     await stand.viewer.unfold("cut");
-    const announced = () => page().locator("[data-said]").textContent();
+    const announced = () => page().locator("[data-announcement]").textContent();
     const { tiles } = stand.manifest;
     const [one, other] = [tiles[0], tiles[tiles.length - 1]];
     const alone = (tile: string) => page().locator(`[data-tile-choice="${tile}"]`).click();
@@ -294,8 +294,8 @@ describeInChromium("the panel of a page with other conditions", () => {
     // isolates the next tile
     for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key);
     const { isolated } = await state();
-    const { told } = await stand.viewer.snapshot();
-    expect(told.at(-1)).toBe(
+    const { stereoNotices } = await stand.viewer.snapshot();
+    expect(stereoNotices.at(-1)).toBe(
       `Only ${tileName(isolated ?? "", [])} is shown, and the cut removes all of it.`,
     );
     expect((await state()).notices).toEqual([]);
@@ -325,12 +325,12 @@ describeInChromium("the panel of a page with other conditions", () => {
     const shown = (await state()).channels.filter((channel) => channel.shown);
     expect(shown.map(({ id }) => id)).toEqual(["Balls", "Block", "marker_0", "marker_42"]);
     expect(await focused()).toBe("marker_42/shown");
-    expect(await page().locator("[data-said]").textContent()).toBe(
+    expect(await page().locator("[data-announcement]").textContent()).toBe(
       "At most 4 channels can be shown at once: F body was hidden to show Marker 42.",
     );
     // the announcement is not a notice, and disappears by itself
     expect((await state()).notices).toEqual([]);
-    await expect.poll(() => page().locator("[data-said]").textContent()).toBe("");
+    await expect.poll(() => page().locator("[data-announcement]").textContent()).toBe("");
     if (SHOTS !== undefined) await page().screenshot({ path: join(SHOTS, "channels-70.png") });
   });
 });

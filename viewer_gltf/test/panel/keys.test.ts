@@ -29,7 +29,7 @@ describeInChromium("a key that is pressed by accident", () => {
   /** Presses each key once and takes it back. `changes`: the key has changed something. */
   const tryAll = (names: readonly string[]) =>
     stand.viewer.page.evaluate(async (names): Promise<Tried[]> => {
-      const line = document.querySelector<HTMLElement>("[data-said]");
+      const line = document.querySelector<HTMLElement>("[data-announcement]");
       if (line === null) throw new Error("the page has no line");
       /** Loaded data is not a change by the user. */
       const comparable = (key: string, value: unknown) => {

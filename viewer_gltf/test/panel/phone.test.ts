@@ -12,7 +12,7 @@ const DESK = { width: 900, height: 600 };
 const INSETS = { top: 47, right: 44, bottom: 34, left: 44 };
 /** Elements that must not lie under a notch: controls, and texts over the view. */
 const PARTS =
-  "button, select, input, canvas[role=application], .said, .first-hint, .notices p, .scale-bar, " +
+  "button, select, input, canvas[role=application], .announcement, .first-hint, .notices p, .scale-bar, " +
   ".name-mark, .orientation-mark, .status, .panel h1, .way, dialog, .help header";
 
 describeInChromium("a phone", () => {

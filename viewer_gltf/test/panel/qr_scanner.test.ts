@@ -56,7 +56,7 @@ describeInChromium("the scanner", () => {
     await addCamera(false);
     await stand.viewer.page.keyboard.press("K");
     await expect
-      .poll(() => stand.viewer.page.locator("[data-said]").textContent())
+      .poll(() => stand.viewer.page.locator("[data-announcement]").textContent())
       .toContain("Permission denied");
     expect(await stand.viewer.page.locator("[data-scanner]").count()).toBe(0);
   });

@@ -37,7 +37,7 @@ describeInChromium("every key", () => {
    */
   const perceived = (isBefore: boolean) =>
     stand.viewer.page.evaluate(async (isBefore) => {
-      const line = document.querySelector("[data-said]");
+      const line = document.querySelector("[data-announcement]");
       if (isBefore) {
         if (line !== null) line.textContent = "";
         if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
@@ -82,7 +82,7 @@ describeInChromium("every key", () => {
   it("reports that a key does not exist, and how to find all keys", async () => {
     await stand.open();
     const { page } = stand.viewer;
-    const announced = () => page.locator("[data-said]").textContent();
+    const announced = () => page.locator("[data-announcement]").textContent();
     await page.evaluate(() => dispatchEvent(new KeyboardEvent("keydown", { key: "§" })));
     expect(await announced()).toBe("§ is not a key of the viewer: ? lists the keys.");
     await page.keyboard.press("}");

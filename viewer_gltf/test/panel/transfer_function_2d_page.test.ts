@@ -21,7 +21,7 @@ describeInChromium("the editor of the joint histogram", () => {
     await stand.viewer.still();
     return takePicture(page());
   };
-  const announced = () => page().locator("[data-said]").textContent();
+  const announced = () => page().locator("[data-announcement]").textContent();
 
   async function shapes() {
     const { state } = await stand.viewer.snapshot();

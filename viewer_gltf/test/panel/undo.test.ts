@@ -48,7 +48,7 @@ describeInChromium("undo and redo", () => {
     await page().keyboard.press("Control+z");
     await stand.viewer.still();
     expect(await axes()).toBe(seen);
-    expect(await page().locator(".said").textContent()).toContain("Undone: viewpoint");
+    expect(await page().locator(".announcement").textContent()).toContain("Undone: viewpoint");
     await page().keyboard.press("Control+z");
     expect((await state()).mode).toBe("disc");
     await control("undo").click();

@@ -72,7 +72,7 @@ describeInChromium("the path tracer", () => {
   const gather = (run: Run) => call("gather", run);
 
   /** Other forms in which the same medium can be given. */
-  const TOLD = [
+  const MEDIUM_FORMS = [
     ["by value and gradient", { isTwoD: true }],
     ["in bricks", { isBricked: true }],
     ["in bricks by value and gradient", { isBricked: true, isTwoD: true }],
@@ -83,16 +83,16 @@ describeInChromium("the path tracer", () => {
   const swallowsNothing = [
     ["scattering forward", { surface: 0, anisotropy: 0.6 }, {}],
     ["with surfaces that shine", { surface: 0.7, shine: 1 }, {}],
-    ...TOLD.slice(3).map(([name, told]) => [name, { surface: 0.4 }, told] as const),
+    ...MEDIUM_FORMS.slice(3).map(([name, form]) => [name, { surface: 0.4 }, form] as const),
   ] as const;
-  for (const [name, settings, told] of sweep(
+  for (const [name, settings, form] of sweep(
     swallowsNothing,
-    ([, { surface }, told]) => surface === 0.7 || "isTwoD" in told,
+    ([, { surface }, form]) => surface === 0.7 || "isTwoD" in form,
   )) {
     it(`makes a medium without absorption vanish in a white room: ${name}`, async () => {
-      const passes = Object.keys(told).length > 0 ? 96 : 256;
+      const passes = Object.keys(form).length > 0 ? 96 : 256;
       const pixels = 20;
-      const { sums } = await gather({ ...BASE, ...told, settings, passes, pixels });
+      const { sums } = await gather({ ...BASE, ...form, settings, passes, pixels });
       const found: number[] = [];
       for (let i = 0; i < sums.length; i += 4) {
         if (sums[i + 3] < 0.2 * passes) continue;
@@ -129,10 +129,10 @@ describeInChromium("the path tracer", () => {
       intensities.flatMap((value) => new Array<number>(SIZE[0] * SIZE[1]).fill(value));
 
     const isAsExpected = (found: Gathered, expected: number) => {
-      const { mean: met } = coverage(found);
+      const { mean: share } = coverage(found);
       const count = samplesOf(found).reduce((a, b) => a + b, 0);
       const error = Math.sqrt((expected * (1 - expected)) / count);
-      expect(Math.abs(1 - met - expected) / error).toBeLessThan(3);
+      expect(Math.abs(1 - share - expected) / error).toBeLessThan(3);
     };
 
     it("that is homogeneous", async () => {
@@ -143,15 +143,15 @@ describeInChromium("the path tracer", () => {
       isAsExpected(await gather({ ...far, texels, opacities }), expected);
     });
 
-    for (const [name, told] of sweep(TOLD, ([, told]) => !("isTwoD" in told))) {
+    for (const [name, form] of sweep(MEDIUM_FORMS, ([, form]) => !("isTwoD" in form))) {
       it(`given ${name}`, async () => {
-        const { channels = 1 }: Partial<Run> = told;
+        const { channels = 1 }: Partial<Run> = form;
         const opacity = 20; // opacity of one channel, 8 bits; equal channels share it
         const share = Math.round(255 * (1 - (1 - opacity / 255) ** (1 / channels)));
         const opacities = new Array<number>(256).fill(opacity);
         const texels = slab(AXIS.map(() => 255));
         const expected = (1 - share / 255) ** (32 * channels);
-        isAsExpected(await gather({ ...far, ...told, texels, opacities }), expected);
+        isAsExpected(await gather({ ...far, ...form, texels, opacities }), expected);
       });
     }
 
@@ -329,11 +329,11 @@ describeInChromium("the path tracer", () => {
       const sway = Array.from({ length: 64 }, (_, i) => [0.1 * Math.min(i, 63 - i), 0, 0]);
       const fresh = await gather(still);
       const swayed = await gather({ ...still, asides: sway });
-      const met = (found: Gathered, share: number) =>
+      const hitPixels = (found: Gathered, share: number) =>
         Array.from({ length: still.pixels ** 2 }, (_, i) => i).filter(
           (i) => found.sums[4 * i + 3] >= share * found.moments[4 * i + 1],
         );
-      const counts = met(fresh, 0.5).map((i) => swayed.moments[4 * i + 1]);
+      const counts = hitPixels(fresh, 0.5).map((i) => swayed.moments[4 * i + 1]);
       expect(counts.length).toBeGreaterThan(100);
       expect(mean(counts)).toBeGreaterThan(16);
       // At most 48 samples are carried over, and those of the last place are added.
@@ -378,14 +378,14 @@ describeInChromium("the path tracer", () => {
       camera: { eye: [10, -10, 6000], target: [10, -10, 20], fov_deg: 0.153 },
     });
     const openness = (isThere: (away_um: number) => boolean) => {
-      let [open, met] = [0, 0];
+      let [open, hits] = [0, 0];
       samplesOf(found).forEach((_, i) => {
         const [x, y] = [i % 32, Math.floor(i / 32)].map((v) => Math.abs((v - 15.5) / 2));
         if (!isThere(Math.max(x, y))) return;
         open += found.moments[4 * i + 3];
-        met += found.sums[4 * i + 3];
+        hits += found.sums[4 * i + 3];
       });
-      return open / met;
+      return open / hits;
     };
     const [ground, face] = [openness((um) => um < 1), openness((um) => um > 4)];
     expect(face).toBeGreaterThan(0.85);

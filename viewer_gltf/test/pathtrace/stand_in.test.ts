@@ -25,7 +25,7 @@ const BACKGROUND: Pixel = [11, 13, 18];
 const BLOCK = 4;
 
 /** An environment that is bright above and dim below, with a window on one side. */
-const ROOM = {
+const WINDOW_ENVIRONMENT = {
   width: 4,
   height: 2,
   rgb: [...[1, 1.1, 1.3], ...[6, 5.5, 5], ...[1, 1.1, 1.3], ...[1.2, 1.2, 1.2]].concat(
@@ -44,7 +44,7 @@ const SKIN: Specimen = {
 };
 
 function viewOf({ view }: Specimen, settings: Partial<TraceSettings>, pixels = 16): View {
-  return { ...BASE, environment: ROOM, passes: 64, pixels, ...view, settings };
+  return { ...BASE, environment: WINDOW_ENVIRONMENT, passes: 64, pixels, ...view, settings };
 }
 
 /** Returns a pixel over the background, sRGB-encoded like on the page. */

@@ -113,7 +113,7 @@ describeInChromium("a graphics driver", () => {
     expect(await width()).toBe(before / 2);
     expect(await look()).toEqual(seen);
     await expect
-      .poll(() => viewer.page.locator("[data-said]").textContent())
+      .poll(() => viewer.page.locator("[data-announcement]").textContent())
       .toContain("fewer pixels");
     await viewer.page.evaluate(() => sessionStorage.clear()); // like another tab
     await viewer.page.reload();

@@ -49,16 +49,16 @@ describeInChromium("the object chunks", () => {
   });
 
   // the mesh's own steps, um, placed in the scene
-  const umToRoom = new Matrix4().makeRotationY(0.7).scale({ x: 0.01, y: 0.01, z: 0.01 } as never);
-  umToRoom.setPosition(0.1, 1.5, -0.8);
+  const umToScene = new Matrix4().makeRotationY(0.7).scale({ x: 0.01, y: 0.01, z: 0.01 } as never);
+  umToScene.setPosition(0.1, 1.5, -0.8);
   const stepToUm = new Matrix4().makeScale(0.002, 0.002, 0.002).setPosition(-1, -2, -3);
   const matrix = ({ elements }: Matrix4) => `mat4(${elements.map((v) => v.toFixed(9)).join(", ")})`;
-  const toRoom = umToRoom.clone().multiply(stepToUm);
+  const toScene = umToScene.clone().multiply(stepToUm);
   /** Position of a point of a row's object as it is drawn, um. */
   const drawn = async (row: number, place_um: readonly number[], gap_um: number) => {
     const steps = place_um.map((v, i) => ((v + 1 + i) / 0.002).toFixed(3));
     const head = "uniform sampler2D uMiddles;\n#include <chunks/object_gap>\n";
-    const body = `oColor.xyz = objectDrawnIn(vec3(${steps}), ${matrix(toRoom)}, ${matrix(umToRoom)},
+    const body = `oColor.xyz = objectDrawnIn(vec3(${steps}), ${matrix(toScene)}, ${matrix(umToScene)},
       objectMiddle(uMiddles, ${256 + row}.0), ${gap_um.toFixed(3)});`;
     const texels = [0, 1].flatMap((line) =>
       Array.from({ length: 256 }, (_, i) =>

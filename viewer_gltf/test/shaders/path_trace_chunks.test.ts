@@ -665,8 +665,8 @@ describeInChromium("the path tracer's chunks", () => {
       marched: readonly number[],
       coverage = [4, 2],
     ) => {
-      const sums = (mean: readonly number[], met: number) =>
-        floats([1, 1], [...mean.map((v) => met * v), met]);
+      const sums = (mean: readonly number[], coverage: number) =>
+        floats([1, 1], [...mean.map((v) => coverage * v), coverage]);
       const premultiplied = [...light.map((v) => alpha * v), alpha];
       const found = await bare.run(
         ["calibrated_light"],

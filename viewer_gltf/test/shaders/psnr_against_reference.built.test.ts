@@ -48,9 +48,9 @@ async function compare(stand: Stand, channels: readonly string[]) {
     target_um: center,
     fov_deg: FIELD_OF_VIEW_DEG,
   };
-  const said = await askPython("bundle_picture", [stand.bundle, picture], JSON.stringify(asked));
+  const printed = await askPython("bundle_picture", [stand.bundle, picture], JSON.stringify(asked));
   await rm(folder, { recursive: true });
-  return JSON.parse(said) as { psnr: number; drawn: number };
+  return JSON.parse(printed) as { psnr: number; drawn: number };
 }
 
 describe.skipIf(!hasPython)("compared with the float64 reference", () => {

@@ -16,7 +16,7 @@ const SAME_IN_HEADSET = 0.008;
 describeInChromium("the share link", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 270 } });
   const page = () => stand.viewer.page;
-  const said = () => page().locator("[data-said]").textContent();
+  const announced = () => page().locator("[data-announcement]").textContent();
 
   /** Returns the parts of a state that belong to a view; notices and the order of showing do not. */
   function viewOf({ state }: Snapshot) {
@@ -66,10 +66,10 @@ describeInChromium("the share link", () => {
       return ["eye", "pose"].flatMap((name) => parts.get(name)?.split(",").map(Number) ?? []);
     };
     /** Waits until announcements in front of the eyes have disappeared. */
-    const silent = () => expect.poll(told).toEqual([]);
+    const silent = () => expect.poll(noticesInView).toEqual([]);
     /** Waits until the name of the part under the gaze is shown. */
     const rested = () => page().waitForTimeout(1500);
-    const told = async () => (await stand.viewer.snapshot()).told;
+    const noticesInView = async () => (await stand.viewer.snapshot()).stereoNotices;
     const expectSame = (found: readonly number[], wanted: readonly number[]) => {
       expect(found).toHaveLength(wanted.length);
       found.forEach((value, i) => {
@@ -118,7 +118,7 @@ describeInChromium("the share link", () => {
     await stand.open();
     await page().keyboard.press("d");
     await page().keyboard.press("l");
-    await expect.poll(said).toBe("The link is in the clipboard.");
+    await expect.poll(announced).toBe("The link is in the clipboard.");
     const copied = await page().evaluate(() => navigator.clipboard.readText());
     expect(copied).toBe(page().url());
     expect(copied).toContain(`disc=${START_VOLUMES.discRadius_deg - 1}`);
@@ -130,7 +130,7 @@ describeInChromium("the share link", () => {
     });
     await stand.open();
     await page().keyboard.press("l");
-    await expect.poll(said).toContain("selected");
+    await expect.poll(announced).toContain("selected");
     expect(await page().evaluate(() => getSelection()?.toString())).toBe(page().url());
   });
 

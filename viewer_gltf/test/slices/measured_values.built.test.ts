@@ -78,9 +78,9 @@ describe.skipIf(!existsSync(STEREOCELL) || !existsSync(stage))("values as measur
       await files.page.close();
 
       const { page, asked, texts } = await open(`${server.address}${QUERY}`);
-      const told = async (address: string) => (await (await fetch(address)).json()).value;
+      const measured = async (address: string) => (await (await fetch(address)).json()).value;
       await expect.poll(() => asked.length).toBe(numbers(coarse).length);
-      const exact = await Promise.all(asked.map(told));
+      const exact = await Promise.all(asked.map(measured));
       expect(exact.every(Number.isInteger)).toBe(true); // counts of a camera
       await expect
         .poll(texts)
@@ -96,7 +96,7 @@ describe.skipIf(!existsSync(STEREOCELL) || !existsSync(stage))("values as measur
       if (box === null) throw new Error("no picture");
       await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
       await expect.poll(() => asked.length).toBeGreaterThan(before);
-      const under = await Promise.all(asked.slice(before).map(told));
+      const under = await Promise.all(asked.slice(before).map(measured));
       await expect.poll(async () => numbers((await texts())[0])).toEqual(under);
       if (SHOTS) await page.screenshot({ path: `${SHOTS}/measured_values.png` });
       await page.close();

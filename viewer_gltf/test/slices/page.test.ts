@@ -248,8 +248,8 @@ describeInChromium("slices of a CT", () => {
     expect(await texts(".end")).toEqual([..."RLAPRLSIAPSI"]);
     for (const text of await texts(".values")) expect(text).toMatch(/-?\d+ HU/);
     await page.keyboard.press("e");
-    const said = () => page.locator("[data-said]").textContent();
-    expect(await said()).toBe("F body: window -1024 – 1953 HU");
+    const announced = () => page.locator("[data-announcement]").textContent();
+    expect(await announced()).toBe("F body: window -1024 – 1953 HU");
     await viewer.openCard("F_x20_body");
     expect(await page.locator('[data-channel="F_x20_body"]').textContent()).toContain(
       "-1024 – 1953 HU",

@@ -75,7 +75,7 @@ describeInChromium("correct stereo", () => {
     const without = await look();
     await viewer.page.keyboard.press("|");
     await viewer.settled();
-    await expect.poll(async () => (await viewer.snapshot()).told.length).toBe(0);
+    await expect.poll(async () => (await viewer.snapshot()).stereoNotices.length).toBe(0);
     const shown = await look();
     const { scale, center } = place(stand.manifest.specimen.bounds_um);
     const { min, max } = stand.manifest.specimen.bounds_um;

@@ -35,7 +35,7 @@ describeInChromium("the frame in stereo", () => {
 
   async function enter(): Promise<void> {
     await addClock(page());
-    await page().addInitScript(() => localStorage.setItem("stereocell-told", "9"));
+    await page().addInitScript(() => localStorage.setItem("stereocell-introductions", "9"));
     await stand.open("&mode=off");
     await page().keyboard.press("P");
     await page().waitForFunction(() => window.stereocell?.snapshot().isStereo);

@@ -27,7 +27,7 @@ describeInChromium("a gaze that rests on the page's panel", () => {
     stand.host.overrides.set("/bundle/manifest.json", { status: 200, body });
     await addClock(page);
     await page.addInitScript(() => {
-      localStorage.setItem("stereocell-told", "9"); // no introduction card
+      localStorage.setItem("stereocell-introductions", "9"); // no introduction card
       localStorage.setItem("stereocell-screen", "240"); // CSS pixels per inch of the phone's screen
     });
     await stand.open("&mode=off");

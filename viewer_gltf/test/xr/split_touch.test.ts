@@ -35,8 +35,8 @@ describeInChromium("fingers in a Cardboard", () => {
     await page.keyboard.press("j"); // choosing by gaze off
     await page.locator('[data-overlay="stereo"]').tap(); // on the canvas: a phone has no headset
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
-    const told = async () => (await stand.viewer.snapshot()).told.length;
-    await expect.poll(told).toBe(0);
+    const announced = async () => (await stand.viewer.snapshot()).stereoNotices.length;
+    await expect.poll(announced).toBe(0);
     const chosen = async () => {
       const { selected, isolated } = (await stand.viewer.snapshot()).state;
       return [selected, isolated];

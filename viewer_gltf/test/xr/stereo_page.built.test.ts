@@ -217,11 +217,11 @@ describeInChromium("the page in stereo", () => {
     await stand.viewer.page.keyboard.press("P");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
     // Each refused feature is reported in stereo, since the page is hidden.
-    const { told } = await stand.viewer.snapshot();
-    expect(told.at(-1)).toMatch(/can't keep the screen on/);
-    expect(told).toEqual(await notices());
+    const { stereoNotices } = await stand.viewer.snapshot();
+    expect(stereoNotices.at(-1)).toMatch(/can't keep the screen on/);
+    expect(stereoNotices).toEqual(await notices());
     await stand.viewer.page.keyboard.press("j");
-    expect((await stand.viewer.snapshot()).told.at(-1)).toBe("Choosing by gaze: off");
+    expect((await stand.viewer.snapshot()).stereoNotices.at(-1)).toBe("Choosing by gaze: off");
     await stand.viewer.page.waitForTimeout(1500);
     const { width, height } = { width: 480, height: 270 };
     const half = { y: 0, width: width / 2, height };
@@ -235,21 +235,21 @@ describeInChromium("the page in stereo", () => {
     expect(Math.abs(lit[0] - lit[1])).toBeLessThan(0.2 * lit[0]);
     // The surface of the balls, one for each tile, is drawn once for both eyes. The notice about
     // the change has disappeared.
-    const tellings = async () => (await stand.viewer.snapshot()).told.length;
+    const noticeCount = async () => (await stand.viewer.snapshot()).stereoNotices.length;
     const draws = [];
     await holdFrames(stand.viewer.page);
     for (let i = 0; i < 2; i++) {
       await stand.viewer.page.keyboard.press("2");
       await tick(stand.viewer.page, 100);
-      expect(await tellings()).toBeGreaterThan(0);
-      for (let k = 0; k < 60 && (await tellings()) > 0; k++) await tick(stand.viewer.page, 700);
-      expect(await tellings()).toBe(0);
+      expect(await noticeCount()).toBeGreaterThan(0);
+      for (let k = 0; k < 60 && (await noticeCount()) > 0; k++) await tick(stand.viewer.page, 700);
+      expect(await noticeCount()).toBe(0);
       draws.push((await stand.viewer.snapshot()).drawCalls);
     }
     expect(draws[1] - draws[0]).toBe(stand.manifest.tiles.length);
     await stand.viewer.page.keyboard.press("Escape");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
-    expect((await stand.viewer.snapshot()).told).toEqual([]);
+    expect((await stand.viewer.snapshot()).stereoNotices).toEqual([]);
     expect((await state()).selected).not.toBeNull(); // Escape has done nothing else
   });
 
@@ -257,13 +257,15 @@ describeInChromium("the page in stereo", () => {
     const { page } = stand.viewer;
     await restBetweenFrames(page);
     await addClock(page);
-    await page.addInitScript(() => localStorage.removeItem("stereocell-told"));
+    await page.addInitScript(() => localStorage.removeItem("stereocell-introductions"));
     await stand.open("&mode=off");
     await page.keyboard.press("t");
     await page.keyboard.press("P");
-    await expect.poll(async () => (await stand.viewer.snapshot()).told.length).toBeGreaterThan(0);
+    await expect
+      .poll(async () => (await stand.viewer.snapshot()).stereoNotices.length)
+      .toBeGreaterThan(0);
     await holdFrames(page);
-    const texts = async () => (await stand.viewer.snapshot()).told;
+    const texts = async () => (await stand.viewer.snapshot()).stereoNotices;
     const before = await texts();
     await tick(page, 700, 8); // 5.6 s: the oldest notice has disappeared, the next one has not
     expect(await texts()).toEqual(before.slice(1));

@@ -44,7 +44,7 @@ describeInChromium("nearer and farther on the split screen", () => {
     };
     /** Difference of the frame from one with surfaces only. */
     const unlikeSurfaces = async () => {
-      await expect.poll(async () => (await stand.viewer.snapshot()).told.length).toBe(0);
+      await expect.poll(async () => (await stand.viewer.snapshot()).stereoNotices.length).toBe(0);
       const pictures = [];
       for (const mode of ["disc", "off", "disc"]) {
         await page.locator("select[data-mode]").selectOption(mode);

@@ -4,7 +4,7 @@ precision highp float;
 
 #ifdef CROSSING
 uniform bool uIsCrossing;
-uniform mat4 uToRoom[2];  // from each eye's clip space to the scene
+uniform mat4 uToScene[2];  // from each eye's clip space to the scene
 uniform vec3 uEyeAt[2];  // metres
 uniform float uRim;  // metres: distance at which pixels without a surface are weighted
 uniform vec3 uApex;
@@ -26,7 +26,7 @@ void main() {
   if (!uIsCrossing) return;
   int i = eyeAt(gl_FragCoord.xy);
   vec2 at = 2.0 * (gl_FragCoord.xy - uEyes[i].xy) / uEyes[i].zw - 1.0;
-  vec4 far = uToRoom[i] * vec4(at, 1.0, 1.0);
+  vec4 far = uToScene[i] * vec4(at, 1.0, 1.0);
   vec3 dir = normalize(far.xyz / far.w - uEyeAt[i]);
   oColor *= discWeight(uEyeAt[i] + uRim * dir, uApex, uAxis, uDisc);
 #endif

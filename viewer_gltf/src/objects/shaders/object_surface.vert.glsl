@@ -7,7 +7,7 @@ varying float vStain;
 uniform sampler2D uFlags;
 uniform float uInset;
 uniform sampler2D uMiddles;
-uniform mat4 uUmToRoom;
+uniform mat4 uUmToScene;
 uniform float uGap;
 #include <chunks/object_texel>
 #include <chunks/object_gap>
@@ -18,7 +18,7 @@ vec3 objectPlace(vec3 place) {
   vStain = _paint;
   vec3 inset = place - uInset * object_outwards;
   vec4 middle = objectMiddle(uMiddles, object_row);
-  return objectDrawnIn(inset, modelMatrix, uUmToRoom, middle, uGap);
+  return objectDrawnIn(inset, modelMatrix, uUmToScene, middle, uGap);
 }
 
 // Moves the vertices of a hidden object to one point outside the view, where its triangles have no area.

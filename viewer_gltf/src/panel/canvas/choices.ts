@@ -21,7 +21,7 @@ const LARGEST_CELL = 160;
 const MAP_HEIGHT = 5 * ROW;
 /** Smallest cell, px: 4.5 degrees at 1.2 m, so that a gaze can hit it. */
 const SMALLEST_CELL = 78;
-/** Targets that a map counts for on a page; two switches have room beside it. */
+/** Number of targets that a tile map counts as, so that a page has room for two switches beside it. */
 const MAP_TARGETS = 4;
 
 /** Draws options side by side. */

@@ -73,7 +73,7 @@ function makeSwatches(first: Colour, send: Send): Widget<Colour> {
     );
   }
   const tabindex = new RovingTabindex(root);
-  tabindex.follow(buttons, SWATCHES_A_ROW);
+  tabindex.setButtons(buttons, SWATCHES_A_ROW);
   return {
     root,
     update(control) {

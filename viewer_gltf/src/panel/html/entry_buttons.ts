@@ -54,14 +54,14 @@ export class EntryButtons {
   offerFullScreen(onClick: () => void): void {
     this.full.hidden = false;
     this.full.onclick = onClick;
-    const follow = () => {
+    const updateButton = () => {
       const isFull = isFullScreen();
       this.full.classList.toggle("is-full", isFull);
       this.full.ariaLabel = isFull ? "Leave the full screen" : "Full screen";
       this.full.title = `${this.full.ariaLabel} (Shift+Enter)`;
     };
-    document.addEventListener("fullscreenchange", follow);
-    follow();
+    document.addEventListener("fullscreenchange", updateButton);
+    updateButton();
   }
 
   /** @param onClick called within the click, which browsers require */

@@ -218,7 +218,7 @@ export class Help {
     }
     this.none.hidden = left.size > 0;
     const caps = [...left].flatMap((row) => row.caps.map(({ root }) => root));
-    this.tabindex.follow(
+    this.tabindex.setButtons(
       caps.filter((root) => root instanceof HTMLButtonElement),
       1,
     );

@@ -114,12 +114,12 @@ export class FirstHint {
  * unless the pointer or the focus is on its button.
  */
 export class Announcement {
-  private readonly words = element("p", { role: "status" }, { said: "" });
+  private readonly words = element("p", { role: "status" }, { announcement: "" });
   private readonly button = element("button", { type: "button" }, { action: "offer" });
-  readonly root = element("div", { className: "said" }, {}, this.words);
+  readonly root = element("div", { className: "announcement" }, {}, this.words);
   private timer = 0;
 
-  say(text: string): void {
+  show(text: string): void {
     this.write(text, SHOWN_MS);
   }
 

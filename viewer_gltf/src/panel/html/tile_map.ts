@@ -29,7 +29,7 @@ export function makeMap(first: TileMap, send: Send): Widget<TileMap> {
     buttons.set(tile.id, button);
     root.append(button);
   }
-  new RovingTabindex(root).follow([...buttons.values()], first.columns);
+  new RovingTabindex(root).setButtons([...buttons.values()], first.columns);
   let marked = "";
   return {
     root,

@@ -67,8 +67,8 @@ export function makeHistogram(first: HistogramEditor, send: Send): Widget<Histog
     event.preventDefault();
     const index = now.selected ?? 0;
     const from = { value: 0.5, gradient: 0.5 };
-    const meant = { index, count: now.shapes.length };
-    send({ panel: "shape", shape: meant, grab: { index, part: "body", from, shape } });
+    const selected = { index, count: now.shapes.length };
+    send({ panel: "shape", shape: selected, grab: { index, part: "body", from, shape } });
     drag({ value: from.value + by.value, gradient: from.gradient + by.gradient });
   });
   const low = element("span");

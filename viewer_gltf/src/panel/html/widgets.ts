@@ -220,7 +220,9 @@ function makeButton(first: Button, send: Send): Widget<Button> {
   const data = first.showsReason ? { [`${camel(first.id)}Reason`]: "" } : {};
   const reason = element("p", { className: "hint" }, data);
   return {
-    root: first.showsReason ? element("div", { className: "told" }, {}, button, reason) : button,
+    root: first.showsReason
+      ? element("div", { className: "with-reason" }, {}, button, reason)
+      : button,
     update(control) {
       now = control;
       refuse(button, control.refusal);

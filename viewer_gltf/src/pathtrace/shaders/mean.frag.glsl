@@ -15,10 +15,10 @@ void main() {
   vec4 moments = texelFetch(uMoments, at, 0);
   float n = max(moments.y, 1e-6);
   vec4 mean = sums / n;
-  float met = max(sums.a, 1e-6);
-  mean.rgb *= mix(1.0, moments.w / met, uOcclusion);
+  float coverage = max(sums.a, 1e-6);
+  mean.rgb *= mix(1.0, moments.w / coverage, uOcclusion);
   float luminance = dot(sums.rgb, vec3(0.2126, 0.7152, 0.0722)) / n;
   float error = sqrt(max(moments.x / n - luminance * luminance, 0.0) / max(n - 1.0, 1.0));
   oColor = mean;
-  oGuide = vec4(sums.a > 0.0 ? moments.z / met / uEdge : 0.0, moments.y, error, 0.0);
+  oGuide = vec4(sums.a > 0.0 ? moments.z / coverage / uEdge : 0.0, moments.y, error, 0.0);
 }

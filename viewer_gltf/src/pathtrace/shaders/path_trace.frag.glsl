@@ -27,7 +27,7 @@ uniform vec4 uCorner[3];
 uniform mat4 uToBox;  // from normalised device coordinates
 uniform vec3 uEyeAt;  // um, box
 uniform mat4 uSceneToBox;  // as uToBox, but of the current eye, which may have moved a little since
-uniform mat3 uToRoom;  // rotates directions from the box to the environment
+uniform mat3 uToEnvironment;  // rotates directions from the box to the environment
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels ...
 uniform vec4 uEye;  // ... and of the picture
 uniform sampler2D uSceneDepth;
@@ -127,7 +127,7 @@ vec3 lightAt(vec3 p, vec3 from, Scatter s) {
   float reach = 1e30;
   if (drawn == uLampCount) {
     vec4 found;
-    to = sampleEnvironment(found) * uToRoom;  // the transpose rotates back
+    to = sampleEnvironment(found) * uToEnvironment;  // the transpose rotates back
     if (found.a <= 0.0) return vec3(0.0);
     float density = scatterDensity(s, from, to);
     // the balance heuristic (Veach 1997), because scattered paths also reach the environment
@@ -163,7 +163,7 @@ float openness(vec3 p, vec3 to, vec2 span) {
 
 // Returns the light of a path that begins with a scattering at `p`, and writes the openness around that point. If `p`
 // lies on a cut face, `face` is its normal, and otherwise 0.
-vec3 follow(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
+vec3 tracePath(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
   vec3 sum = vec3(0.0);
   vec3 weight = vec3(1.0);
   open = 1.0;
@@ -186,7 +186,7 @@ vec3 follow(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
     float t = span.y > span.x ? track(p, to, span.x, span.y, medium) : -1.0;
     if (i == 1) open = openness(p, to, span);
     if (t < 0.0) {
-      vec4 found = environmentAt(uToRoom * to);
+      vec4 found = environmentAt(uToEnvironment * to);
       float density = scatterDensity(s, dir, to);
       float drawn = found.a / float(uLampCount + 1);
       return sum + weight * uEnvironmentLight * found.rgb * density / max(density + drawn, 1e-12);
@@ -227,7 +227,7 @@ void main() {
   vec3 face = span.x > 0.0 && t < FACE_DEPTH * uVoxel ? cutFace(start) : vec3(0.0);
   vec3 p = face == vec3(0.0) ? start + t * dir : start;
   float open;
-  vec3 color = min(follow(p, dir, medium, face, open), vec3(uMostLight));
+  vec3 color = min(tracePath(p, dir, medium, face, open), vec3(uMostLight));
   float luminance = dot(color, vec3(0.2126, 0.7152, 0.0722));
   oSums += vec4(color, 1.0);
   oMoments += vec4(luminance * luminance, 0.0, span.x + t, open);

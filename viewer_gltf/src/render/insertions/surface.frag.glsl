@@ -7,7 +7,7 @@
 #insert after <color_fragment>
 	#include <part/fragment_color>
 	keepToOwnEye();
-	if (isGone(vRoom) || isCut(vRoom)) discard;
+	if (isGone(vScene) || isCut(vScene)) discard;
 
 #insert after <normal_fragment_maps>
 	if (!gl_FrontFacing) normal = insideNormal(normal, cameraPosition);

@@ -1,6 +1,6 @@
 // Writes depth only, clipped like the surfaces; with SHARED, only where some of the surface is
 // left.
-varying vec3 vRoom;
+varying vec3 vScene;
 #include <chunks/both_eyes_fragment>
 #include <chunks/clip_planes>
 #include <chunks/focus_disc>
@@ -9,9 +9,9 @@ out vec4 oColor;
 
 void main() {
   keepToOwnEye();
-  if (isCut(vRoom)) discard;
+  if (isCut(vScene)) discard;
 #ifdef SHARED
-  if (isGone(vRoom)) discard;
+  if (isGone(vScene)) discard;
 #endif
   oColor = vec4(0.0);
 }

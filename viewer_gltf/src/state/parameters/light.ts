@@ -1,5 +1,6 @@
 /** The parameters of the path-traced image: its medium, its light and the image adjustments. Pure. */
 import {
+  ENVIRONMENT_NUMBERS,
   ENVIRONMENTS,
   type EnvironmentName,
   LAMP_NUMBERS,
@@ -7,7 +8,6 @@ import {
   type Lamp,
   MEDIUM_NUMBERS,
   POST_NUMBERS,
-  ROOM_NUMBERS,
   START_TRACE,
   TONE_MAPS,
   type TraceSettings,
@@ -28,7 +28,7 @@ export const START_LIGHT = {
   /** Settings of path tracing, the mode `traced`. */
   trace: START_TRACE,
   /** Whether the stage has an environment, which is made of its dome lights. */
-  hasStageRoom: false,
+  hasStageEnvironment: false,
   /** Whether the lamps are shown, so that they can be dragged. */
   areLampsShown: false,
 };
@@ -125,13 +125,15 @@ export const ENVIRONMENT: ChoiceParameter<Light, EnvironmentName> = {
   link: "room",
   refusal,
   get: environmentOf.get,
-  set: (on, value) => (value === "stage" && !on.hasStageRoom ? on : environmentOf.set(on, value)),
+  set: (on, value) =>
+    value === "stage" && !on.hasStageEnvironment ? on : environmentOf.set(on, value),
   values: ENVIRONMENTS,
   names: { studio: "Studio", sky: "Sky", stage: "Stage", own: "Own" },
-  options: ({ trace, hasStageRoom }) =>
+  options: ({ trace, hasStageEnvironment }) =>
     ENVIRONMENTS.filter(
       (name) =>
-        (name !== "own" || trace.environment === "own") && (name !== "stage" || hasStageRoom),
+        (name !== "own" || trace.environment === "own") &&
+        (name !== "stage" || hasStageEnvironment),
     ),
   ownValue: "own",
   key: ["I", "Next environment"],
@@ -241,13 +243,13 @@ export const MEDIUM: readonly Parameter<Light>[] = [
   MULTIPLE,
   ENVIRONMENT,
 ];
-export const ROOM: readonly Parameter<Light>[] = numbersOf(ROOM_NUMBERS);
+export const ENVIRONMENT_ROWS: readonly Parameter<Light>[] = numbersOf(ENVIRONMENT_NUMBERS);
 export const LAMP: readonly LampParameters[] = Array.from({ length: LAMPS }, (_, i) => lampOf(i));
 export const AFTER: readonly Parameter<Light>[] = [POST, ...numbersOf(POST_NUMBERS), TONE_MAP];
 
 const rows: readonly Parameter<Light>[] = [
   ...MEDIUM,
-  ...ROOM,
+  ...ENVIRONMENT_ROWS,
   ...LAMP.flatMap(({ numbers, isOn, color }) => [...numbers, isOn, color]),
   ...AFTER,
 ];

@@ -173,8 +173,8 @@ function clearnessOf(
 }
 
 /**
- * 1 where any channel may take light between a texel and the next ones along the axes; mostly none
- * does.
+ * Marks a texel with 1 if any channel may take light between it and its next neighbours along the
+ * axes. Most texels stay 0.
  */
 function dimmingTexels(
   { channels, size: [sx, sy, sz] }: TileMatter,
@@ -195,8 +195,8 @@ function dimmingTexels(
 }
 
 /**
- * Computes one row of it from the smallest and largest value of each texel and its neighbours,
- * `down` and `back` from it.
+ * Marks one row, from the smallest and largest value of each texel and its next neighbours. `down`
+ * and `back` are the steps of the index to the next row and to the next plane; 0 at the end.
  */
 function markRow(
   found: Uint8Array,

@@ -71,7 +71,7 @@ export class DepthShading {
    *
    * @param towards direction to the lamp in the world
    */
-  follow(marched: readonly Marched[], clip: MarchClip, towards: Vector3): void {
+  sync(marched: readonly Marched[], clip: MarchClip, towards: Vector3): void {
     if (this.strength === 0 || marched.length === 0) return;
     const isLeaving = ({ packed, resident }: Marched) =>
       packed.channels.some((id) => !resident.texture.kept.has(id));

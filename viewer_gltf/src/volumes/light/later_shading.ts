@@ -26,10 +26,10 @@ export class LaterShading {
    * @param strength 0 turns the shading off
    * @param lamp direction to the lamp in the world
    */
-  follow(drawn: readonly Marched[], strength: number, clip: MarchClip, lamp: Vector3): void {
+  sync(drawn: readonly Marched[], strength: number, clip: MarchClip, lamp: Vector3): void {
     if (strength > 0 && drawn.length > 0 && this.code === "none") void this.load();
     this.shading?.set(strength);
-    this.shading?.follow(drawn, clip, lamp);
+    this.shading?.sync(drawn, clip, lamp);
   }
 
   private async load(): Promise<void> {

@@ -113,7 +113,7 @@ function addRow(
   }
 }
 
-/** 1 where any cell within `reach` along each axis takes light; elsewhere nothing is occluded. */
+/** Marks the cells (1) that have a cell within `reach` along each axis that takes light. Other cells are not occluded. */
 function dimmedWithin(through: Float32Array, size: Size3, reach: number): Uint8Array {
   let found = new Uint8Array(through.length);
   for (let i = 0; i < found.length; i++) found[i] = through[i] === 1 ? 0 : 1;
@@ -174,7 +174,7 @@ export function lampLight(through: Float32Array, size: Size3, towards: Vec3): Fl
   return lit;
 }
 
-/** Interleaves both as bytes. */
+/** Interleaves openness and lamp light as bytes, 0 to 255. */
 export function asTexels(open: Float32Array, lit: Float32Array): Uint8Array<ArrayBuffer> {
   const texels = new Uint8Array(2 * open.length);
   for (let i = 0; i < open.length; i++) {

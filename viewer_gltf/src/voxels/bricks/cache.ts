@@ -99,11 +99,11 @@ export class BrickCache {
         tables.put({ ...table, brick_bytes: table.brick_bytes + more });
       }
       await finished(work);
-      await this.makeRoom(volume);
+      await this.freeSpace(volume);
     });
   }
 
-  private async makeRoom(but: string): Promise<void> {
+  private async freeSpace(but: string): Promise<void> {
     const { database } = this;
     if (database === null) return;
     const tables = (await resultOf(

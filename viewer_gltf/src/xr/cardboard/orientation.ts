@@ -104,8 +104,8 @@ export function headPose(head: Quaternion, heading: Heading, out = new Matrix4()
 export type HeadTurn = Readonly<{ head: Quaternion; time_ms: number }>;
 
 /**
- * Milliseconds between two reports. A speed from closer reports is noise; from farther ones it says
- * nothing about now.
+ * Milliseconds. Range of intervals between two reports from which a speed is computed: shorter
+ * intervals give noise, and longer ones an outdated speed.
  */
 const REPORTS_MS = [4, 100] as const;
 /**

@@ -33,10 +33,10 @@ export class LaterScreen {
    * Places the eyes in front of the screen, looking at `focus`: two if the screen shows stereo,
    * otherwise one.
    */
-  follow(eyes: Eyes, camera: PerspectiveCamera, focus: Vector3, pupils_m: number): void {
+  sync(eyes: Eyes, camera: PerspectiveCamera, focus: Vector3, pupils_m: number): void {
     const { images, kind } = this;
     if (images === null || kind === "off") eyes.followScreen(this.renderer, camera);
-    else images.follow(eyes, camera, focus, pupils_m, kind);
+    else images.sync(eyes, camera, focus, pupils_m, kind);
   }
 
   /** Draws a frame, as an anaglyph if that is chosen. */

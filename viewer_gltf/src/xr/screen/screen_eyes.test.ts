@@ -16,7 +16,7 @@ function cameraAt(z: number): PerspectiveCamera {
 /** Pixels by which a point lies further to the right for the left eye than for the right eye. */
 function disparity_px(point: Vector3, z: number, pupils_m = PUPILS_M): number {
   const eyes = new ScreenEyes();
-  eyes.follow(cameraAt(z), new Vector3(0.1, 0, 0), pupils_m, [WIDTH, HEIGHT]);
+  eyes.sync(cameraAt(z), new Vector3(0.1, 0, 0), pupils_m, [WIDTH, HEIGHT]);
   const [left, right] = eyes.pairs.map(([camera]) => {
     camera.matrixWorldInverse.copy(camera.matrixWorld).invert();
     const seen = point.clone().applyMatrix4(camera.matrixWorldInverse);
@@ -51,7 +51,7 @@ it("keeps the parallax behind the screen below a thirtieth of the width", () => 
 
 it("gives each eye its half of the render target", () => {
   const eyes = new ScreenEyes();
-  eyes.follow(cameraAt(1), new Vector3(), PUPILS_M, [WIDTH, HEIGHT]);
+  eyes.sync(cameraAt(1), new Vector3(), PUPILS_M, [WIDTH, HEIGHT]);
   expect(eyes.pairs.map(([, viewport]) => viewport.toArray())).toEqual([
     [0, 0, WIDTH, HEIGHT],
     [WIDTH, 0, WIDTH, HEIGHT],

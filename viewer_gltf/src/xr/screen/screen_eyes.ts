@@ -29,7 +29,7 @@ export class ScreenEyes {
    * @param pupils_m distance between the user's pupils, metres
    * @param size of one eye's image, pixels; the right eye's lies to the right of the left eye's
    */
-  follow(
+  sync(
     camera: PerspectiveCamera,
     focus: Vector3,
     pupils_m: number,

@@ -39,7 +39,7 @@ export class ScreenImages {
   constructor(private readonly renderer: WebGLRenderer) {}
 
   /** Places the eyes for this frame; see ScreenEyes. */
-  follow(
+  sync(
     eyes: Eyes,
     camera: PerspectiveCamera,
     focus: Vector3,
@@ -49,8 +49,8 @@ export class ScreenImages {
     const { drawingBufferWidth: width, drawingBufferHeight: height } = this.renderer.getContext();
     const across = kind === "anaglyph" ? width : Math.floor(width / 2);
     if (kind === "anaglyph") this.target.setSize(2 * across, height);
-    this.eyes.follow(camera, focus, pupils_m, [across, height]);
-    eyes.follow(this.eyes.pairs);
+    this.eyes.sync(camera, focus, pupils_m, [across, height]);
+    eyes.sync(this.eyes.pairs);
   }
 
   present(draw: () => void): void {

@@ -22,8 +22,8 @@ import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { labelBoxes } from "../../../src/capture/label_boxes";
 import { gazeOf, type Hit } from "../../../src/interaction/ray_pointer";
 import { rayAhead, rayUnder } from "../../../src/interaction/rays";
+import { eyeViewOf } from "../../../src/marks/eye_view";
 import type { Label } from "../../../src/marks/label";
-import { sightOf } from "../../../src/marks/sight";
 import type { Vec3 } from "../../../src/math/vec3";
 import { Reading } from "../../../src/probe/probe_reader";
 import { Specimen } from "../../../src/render/specimen_pose";
@@ -143,7 +143,7 @@ class Bench {
     const dispatch = (action: Action) => {
       this.state = reduce(this.state, action);
       this.reading.state = this.state;
-      this.marks.follow(this.state);
+      this.marks.sync(this.state);
       this.draw();
     };
     const manifest = { ...MANIFEST, specimen: { ...MANIFEST.specimen, sides } };
@@ -200,7 +200,7 @@ class Bench {
   dispatch(action: Action): void {
     this.state = reduce(this.state, action);
     this.reading.state = this.state;
-    this.marks.follow(this.state);
+    this.marks.sync(this.state);
     this.draw();
   }
 
@@ -227,7 +227,7 @@ class Bench {
       head: camera.matrixWorld,
       specimen: specimen.group.matrixWorld,
       screen: shown,
-      sight: sightOf(camera.matrixWorld, specimen.group.matrixWorld, shown),
+      eyeView: eyeViewOf(camera.matrixWorld, specimen.group.matrixWorld, shown),
       gaze: rayAhead(camera.matrixWorld, specimen.group),
       disc: null,
       isPanelOpen: view.isPanelOpen ?? false,
@@ -240,10 +240,10 @@ class Bench {
   /** Returns the place of a point (um) on the page, in CSS pixels of the stage. */
   project(point: Vec3): Place {
     const room = new Vector3(...point).applyMatrix4(this.specimen.group.matrixWorld);
-    return this.projectRoom(room);
+    return this.projectScene(room);
   }
 
-  private projectRoom(room: Vector3): Place {
+  private projectScene(room: Vector3): Place {
     const { x, y } = room.clone().project(this.camera);
     const { clientWidth, clientHeight } = this.stage;
     return { x: ((x + 1) / 2) * clientWidth, y: ((1 - y) / 2) * clientHeight };
@@ -263,7 +263,7 @@ class Bench {
       .transformDirection(this.camera.matrixWorld)
       .multiplyScalar((length_um * this.specimen.scale) / 2);
     const [a, b] = [half, half.clone().negate()].map((by) =>
-      this.projectRoom(this.focus.clone().add(by)),
+      this.projectScene(this.focus.clone().add(by)),
     );
     return { text, shown_px, true_px: Math.hypot(a.x - b.x, a.y - b.y) };
   }

@@ -142,7 +142,7 @@ export async function enter(
   await context.addInitScript(() => {
     // the card at the start of stereo would cover the view; it is not shown to users who have seen
     // it
-    if (location.protocol.startsWith("http")) localStorage.setItem("stereocell-told", "3");
+    if (location.protocol.startsWith("http")) localStorage.setItem("stereocell-introductions", "3");
   });
   if (isBlind) {
     await context.addInitScript(() => {

@@ -1,5 +1,5 @@
 /** The light of pixels, and the light of the scene on surfaces that face the eye. */
-import { type FarLamp, OWN_LIGHT } from "../../../src/gpu/room_light";
+import { type FarLamp, OWN_LIGHT } from "../../../src/gpu/scene_light";
 import { fromHex } from "../../../src/math/color";
 import type { Vec3 } from "../../../src/math/vec3";
 import { FIELD_OF_VIEW_RAD } from "./camera";

@@ -50,7 +50,7 @@ export async function withoutMarks<T>(page: Page, job: () => Promise<T>): Promis
   const show = (visibility: string) =>
     page.evaluate((value) => {
       const marks =
-        ".scale-bar, .orientation-mark, .name-mark, .said, .first-hint, .tap-area, .view-message, .ways-in";
+        ".scale-bar, .orientation-mark, .name-mark, .announcement, .first-hint, .tap-area, .view-message, .ways-in";
       for (const mark of document.querySelectorAll<HTMLElement | SVGElement>(marks)) {
         mark.style.visibility = value;
       }

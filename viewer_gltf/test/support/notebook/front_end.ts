@@ -116,7 +116,7 @@ export class FrontEnd {
     const cellAddress = `${host.address}/cell.html`;
     const around = `<iframe src="${cellAddress}" width="600" height="280"></iframe>`;
     outer.overrides.set("/outer.html", { status: 200, body: around });
-    await page.exposeFunction("toKernel", (message: string) => kernel.tell(JSON.parse(message)));
+    await page.exposeFunction("toKernel", (message: string) => kernel.receive(JSON.parse(message)));
     await page.goto(isForeign ? `${outer.address}/outer.html` : cellAddress);
     const inner = isForeign ? await page.waitForSelector("iframe") : null;
     const cell = (await inner?.contentFrame()) ?? page.mainFrame();

@@ -17,11 +17,11 @@ export class Kernel {
   /** Later changes of the state, for a page that opens afterwards. */
   readonly sent: Message[] = [];
   /** All messages of the page. */
-  readonly told: string[] = [];
+  readonly received: string[] = [];
   /** Number of messages in both directions. */
-  heard = 0;
+  messageCount = 0;
   onMessage: (message: Message) => void = () => undefined;
-  private readonly answers: ((told: Answer) => void)[] = [];
+  private readonly answers: ((message: Answer) => void)[] = [];
   private readonly child: ChildProcess;
 
   constructor(bundle: string) {
@@ -35,22 +35,22 @@ export class Kernel {
     const lines = createInterface({ input: stdout });
     this.opened = new Promise((resolve) => {
       lines.on("line", (line) => {
-        const told = JSON.parse(line);
-        if ("answer" in told || "fault" in told) this.answers.shift()?.(told);
-        else if (told.type === "comm_open") resolve(told);
+        const message = JSON.parse(line);
+        if ("answer" in message || "fault" in message) this.answers.shift()?.(message);
+        else if (message.type === "comm_open") resolve(message);
         else {
-          if (told.data.method === "update") this.sent.push(told);
-          this.heard++;
-          this.onMessage(told);
+          if (message.data.method === "update") this.sent.push(message);
+          this.messageCount++;
+          this.onMessage(message);
         }
       });
     });
   }
 
   /** Passes a message of the page to Python. */
-  tell(message: unknown): void {
-    this.heard++;
-    this.told.push(JSON.stringify(message));
+  receive(message: unknown): void {
+    this.messageCount++;
+    this.received.push(JSON.stringify(message));
     this.write(message);
   }
 

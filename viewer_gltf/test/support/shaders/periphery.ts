@@ -47,7 +47,7 @@ export function sparsePixels(): readonly SparsePixel[] {
   const pass = new ScreenPass(SLOPE, { uLens: frame.uLens });
   pass.uPart.value = frame.uPart.value;
   const eyes = new Eyes();
-  eyes.follow(
+  eyes.sync(
     SIDES.map(([left, right, bottom, top], i) => {
       const camera = new PerspectiveCamera();
       camera.projectionMatrix.makePerspective(left, right, top, bottom, 1, 10);

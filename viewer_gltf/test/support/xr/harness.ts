@@ -224,7 +224,7 @@ class Stand {
     return point.toArray();
   }
 
-  tell(text: string): Promise<void> {
+  announce(text: string): Promise<void> {
     this.hands.announce(text);
     return this.step([0]);
   }
@@ -277,7 +277,7 @@ class Stand {
       regions: panel.regions.map(({ id }) => id),
       labels: panel.regions.map(({ label }) => label),
       drags: this.drags.length,
-      told: this.hands.notice.mesh.visible ? this.hands.notice.texts : [],
+      notices: this.hands.notice.mesh.visible ? this.hands.notice.texts : [],
       textures: this.renderer.info.memory.textures,
       geometries: this.renderer.info.memory.geometries,
     };
@@ -324,7 +324,7 @@ function leftOfTheUncut(): readonly (readonly [number, number])[] {
   const side_px = 16;
   renderer.setSize(side_px, side_px, false);
   const cuts = new Cuts();
-  cuts.follow({ box: null, plane: { normal: [0, 0, 1], offset_um: -1e6 } }, new Matrix4());
+  cuts.sync({ box: null, plane: { normal: [0, 0, 1], offset_um: -1e6 } }, new Matrix4());
   const both = new BothEyes();
   const { uCuts, uCutCount } = cuts;
   const material = depthMaterial({ uCuts, uCutCount, ...both.uniforms }, both);

@@ -63,7 +63,7 @@ class ButtonSession extends EventTarget {
 export class LookingPerson {
   state: ViewerState;
   /** All requests that left the panel. */
-  readonly wishes: unknown[] = [];
+  readonly requests: unknown[] = [];
   /**
    * Number of changes, including the pages of the panel. A change in the following frame counts as
    * the same one.
@@ -108,11 +108,11 @@ export class LookingPerson {
       now_ms: () => this.now_ms,
       buildPanel: (view) => buildPanel(this.state, FACTS, view),
       onAction: (action) => {
-        this.wishes.push(action);
+        this.requests.push(action);
         this.state = reduce(this.state, action);
       },
       onCommand: (command) => {
-        this.wishes.push(command);
+        this.requests.push(command);
         this.hands.run(command, this.state);
       },
       onChoose: (ray, tile) => {
@@ -120,11 +120,11 @@ export class LookingPerson {
           this.measured.push(ray);
           return;
         }
-        this.wishes.push(tile);
+        this.requests.push(tile);
         this.state = reduce(this.state, chosenTile(this.state, tile));
       },
-      onLeave: () => this.wishes.push("leave"),
-      onLenses: (lenses) => this.wishes.push(lenses),
+      onLeave: () => this.requests.push("leave"),
+      onLenses: (lenses) => this.requests.push(lenses),
     });
     this.hands.start(null);
     this.frame(0);
@@ -269,7 +269,7 @@ export class LookingPerson {
     for (let k = 0; k < page; k++) this.pressOn("more");
     this.lookUp();
     this.frame(FRAME_S);
-    this.wishes.length = 0;
+    this.requests.length = 0;
     this.changes = 0;
   }
 
@@ -321,7 +321,7 @@ export class LookingPerson {
 
   private note(): void {
     const { isOpen, quad } = this.hands.panel;
-    const now = [this.state, isOpen, quad.paints, this.wishes.length];
+    const now = [this.state, isOpen, quad.paints, this.requests.length];
     const hasChanged = now.some((each, i) => each !== this.before[i]);
     this.before = now;
     if (hasChanged && !this.hasJustChanged) this.changes++;

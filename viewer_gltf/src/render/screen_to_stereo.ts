@@ -12,7 +12,7 @@ import { type HandPose, moveByOneHand, type SpecimenPose } from "../math/grab";
  * @param ahead_m where that point lies in stereo, metres
  * @param facing orientation of the eyes
  */
-export function intoRoom(
+export function intoStereo(
   pose: SpecimenPose,
   screen: HandPose,
   ahead_m: Vector3,
@@ -21,7 +21,7 @@ export function intoRoom(
   return moveByOneHand(pose, screen, { position: ahead_m, orientation: facing });
 }
 
-/** The inverse of `intoRoom`. */
+/** The inverse of `intoStereo`. */
 export function ontoScreen(
   pose: SpecimenPose,
   screen: HandPose,

@@ -11,21 +11,21 @@ import {
   Scene,
 } from "three";
 import type { Bounds, Manifest } from "../bundle/generated/bundle";
-import type { FarLamp, RoomLight } from "../gpu/room_light";
+import type { FarLamp, SceneLight } from "../gpu/scene_light";
 import type { Rgb } from "../math/color";
 import type { Vec3 } from "../math/vec3";
-import { roomLightOf } from "../state/stage_light";
+import { sceneLightOf } from "../state/stage_light";
 import type { Backdrop } from "./backdrop";
 import { Specimen } from "./specimen_pose";
 import { FAR, type Theme } from "./theme";
 
 const OUTLINE = 0x5b6678;
 
-export class Room {
+export class SpecimenScene {
   readonly scene = new Scene();
   readonly specimen: Specimen;
   /** The light on everything that is not path-traced. */
-  readonly light: RoomLight;
+  readonly light: SceneLight;
   private readonly key: DirectionalLight;
   private readonly fill: DirectionalLight;
   private readonly outline: Box3Helper;
@@ -40,7 +40,7 @@ export class Room {
     this.specimen = new Specimen(manifest.specimen.bounds_um);
     const { group } = this.specimen;
     this.scene.background = this.dark;
-    this.light = roomLightOf(manifest);
+    this.light = sceneLightOf(manifest);
     const { key, fill, sky, ground } = this.light;
     this.key = new DirectionalLight(colorOf(key.light), Math.PI);
     this.fill = new DirectionalLight(colorOf(fill.light), Math.PI);

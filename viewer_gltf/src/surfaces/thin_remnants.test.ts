@@ -3,7 +3,7 @@ import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js
 import { describe, expect, it } from "vitest";
 import type { Box } from "../math/box";
 import type { Vec3 } from "../math/vec3";
-import { type Face, faceTowards, leaveRestsOut } from "./thin_rests";
+import { type Face, faceTowards, hideRemnants } from "./thin_remnants";
 
 /** Two adjacent tiles, um; the left one is drawn as a volume. */
 const LEFT: Box = { min: [0, 0, 0], max: [10, 10, 8] };
@@ -33,16 +33,16 @@ function drawnTriangles(geometry: BufferGeometry): readonly Vec3[] {
 }
 
 function trianglesAfter(geometry: BufferGeometry, face: Face | null = faceOf(RIGHT, LEFT)): number {
-  leaveRestsOut(geometry, new Matrix4(), face);
+  hideRemnants(geometry, new Matrix4(), face);
   return drawnTriangles(geometry).length;
 }
 
 describe("beside an open tile", () => {
-  it("a flat rest that touches the face is not drawn, and is drawn again later", () => {
-    const rest = cap(10, 0.5, 4);
-    const all = (rest.index?.count ?? 0) / 3;
-    expect(trianglesAfter(rest)).toBe(0);
-    expect(trianglesAfter(rest, null)).toBe(all);
+  it("a flat remnant that touches the face is not drawn, and is drawn again later", () => {
+    const remnant = cap(10, 0.5, 4);
+    const all = (remnant.index?.count ?? 0) / 3;
+    expect(trianglesAfter(remnant)).toBe(0);
+    expect(trianglesAfter(remnant, null)).toBe(all);
   });
 
   it("a needle along the end of the data that begins at the face is not drawn", () => {
@@ -60,9 +60,9 @@ describe("beside an open tile", () => {
     expect(trianglesAfter(component)).toBe(all);
   });
 
-  it("only the rest is removed from a mesh of several components", () => {
-    const [rest, other] = [cap(10, 0.4, 3, 2), cap(10, 3, 5, 6.5)];
-    const both = mergeGeometries([rest, other]);
+  it("only the remnant is removed from a mesh of several components", () => {
+    const [remnant, other] = [cap(10, 0.4, 3, 2), cap(10, 3, 5, 6.5)];
+    const both = mergeGeometries([remnant, other]);
     const kept = drawnTriangles(other).length;
     expect(trianglesAfter(both)).toBe(kept);
     expect(drawnTriangles(both).every(([, y]) => y > 3.9)).toBe(true);
@@ -77,7 +77,7 @@ describe("beside an open tile", () => {
 
   it("a mesh is measured in world coordinates", () => {
     const metres = cap(10, 0.5, 4).scale(1e-6, 1e-6, 1e-6);
-    leaveRestsOut(metres, new Matrix4().makeScale(1e6, 1e6, 1e6), faceOf(RIGHT, LEFT));
+    hideRemnants(metres, new Matrix4().makeScale(1e6, 1e6, 1e6), faceOf(RIGHT, LEFT));
     expect(drawnTriangles(metres)).toEqual([]);
   });
 });

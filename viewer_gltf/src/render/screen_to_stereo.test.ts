@@ -1,7 +1,7 @@
 import { Euler, PerspectiveCamera, Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import { poseMatrix, type SpecimenPose } from "../math/grab";
-import { intoRoom, ontoScreen } from "./screen_to_room";
+import { intoStereo, ontoScreen } from "./screen_to_stereo";
 
 const AHEAD = new Vector3(0.1, -0.2, -1.1);
 const POSE: SpecimenPose = {
@@ -24,22 +24,22 @@ const points = [new Vector3(), new Vector3(0.5, 0, 0), new Vector3(-0.1, 0.3, 0.
 describe("the specimen moved between the screen and stereo", () => {
   it("lies in front of the head as in front of the camera, with the camera's target straight ahead", () => {
     const { camera: eye, screen } = camera();
-    const inRoom = intoRoom(POSE, screen, AHEAD);
+    const inStereo = intoStereo(POSE, screen, AHEAD);
     const toTarget = screen.position.clone().applyMatrix4(eye.matrixWorldInverse);
     for (const point of points) {
       const seen = point
         .clone()
         .applyMatrix4(poseMatrix(POSE))
         .applyMatrix4(eye.matrixWorldInverse);
-      const found = point.clone().applyMatrix4(poseMatrix(inRoom));
+      const found = point.clone().applyMatrix4(poseMatrix(inStereo));
       // seen from the target in the same direction
       expect(found.sub(AHEAD).distanceTo(seen.sub(toTarget))).toBeCloseTo(0, 9);
     }
   });
 
   it.each([
-    ["there and back", intoRoom, ontoScreen],
-    ["back and there", ontoScreen, intoRoom],
+    ["there and back", intoStereo, ontoScreen],
+    ["back and there", ontoScreen, intoStereo],
   ])("has the same pose again, %s", (_, go, comeBack) => {
     const { screen } = camera();
     const again = comeBack(go(POSE, screen, AHEAD), screen, AHEAD);

@@ -1,8 +1,8 @@
 /**
- * Finds thin rests of objects beside an open tile, which are not drawn while the tile is open.
+ * Finds thin remnants of objects beside an open tile, which are not drawn while the tile is open.
  *
  * If one tile is drawn as a volume, its neighbours are still drawn as surfaces. An object that extends
- * slightly past the shared face leaves a flat rest in the neighbour, which looks like an opaque lens
+ * slightly past the shared face leaves a flat remnant in the neighbour, which looks like an opaque lens
  * beside the translucent volume. An object that is cut by the end of the data leaves a sliver there,
  * which sticks out like a needle.
  */
@@ -10,9 +10,9 @@ import { Box3, type BufferGeometry, type Matrix4, Vector3 } from "three";
 import type { Box } from "../math/box";
 import { AXES } from "../math/vec3";
 
-/** A rest lies within this share of its tile's edge from one of the tile's faces. */
+/** A remnant lies within this share of its tile's edge from one of the tile's faces. */
 const DEEPEST = 3 / 20;
-/** A rest extends at most this share of its own length from that face. */
+/** A remnant extends at most this share of its own length from that face. */
 const FLATTEST = 1 / 3;
 /**
  * A flat component longer than this share of the tile's shortest edge is a layer, which is drawn.
@@ -41,31 +41,31 @@ export function faceTowards(tile: Box, other: Box): Face | null {
 }
 
 /**
- * Removes the thin rests at a face from a mesh, or draws all triangles again.
+ * Removes the thin remnants at a face from a mesh, or draws all triangles again.
  *
- * The triangles of the rests are moved to the end of the index, where they are not drawn.
+ * The triangles of the remnants are moved to the end of the index, where they are not drawn.
  *
  * @param toWorld from the mesh's coordinates to um, world
  * @param face null: all triangles are drawn
  */
-export function leaveRestsOut(geometry: BufferGeometry, toWorld: Matrix4, face: Face | null): void {
+export function hideRemnants(geometry: BufferGeometry, toWorld: Matrix4, face: Face | null): void {
   geometry.setDrawRange(0, Number.POSITIVE_INFINITY);
   const { index } = geometry;
   if (face === null || index === null) return;
-  const isRest = restVertices(geometry, toWorld, face);
-  if (isRest === null) return;
+  const isRemnant = remnantVertices(geometry, toWorld, face);
+  if (isRemnant === null) return;
   const corners = index.array;
   const [drawn, left]: [number[], number[]] = [[], []];
   for (let i = 0; i < corners.length; i += 3) {
-    (isRest(corners[i]) ? left : drawn).push(corners[i], corners[i + 1], corners[i + 2]);
+    (isRemnant(corners[i]) ? left : drawn).push(corners[i], corners[i + 1], corners[i + 2]);
   }
   index.array.set([...drawn, ...left]);
   index.needsUpdate = true;
   geometry.setDrawRange(0, drawn.length);
 }
 
-/** Whether each vertex belongs to a thin rest; null if there is none. */
-function restVertices(
+/** Whether each vertex belongs to a thin remnant; null if there is none. */
+function remnantVertices(
   geometry: BufferGeometry,
   toWorld: Matrix4,
   face: Face,
@@ -79,9 +79,9 @@ function restVertices(
     const extent = extents.get(root) ?? new Box3();
     extents.set(root, extent.expandByPoint(place.fromArray(places, 3 * vertex)));
   }
-  const rests = new Set<number>();
-  for (const [root, extent] of extents) if (isRest(extent, face)) rests.add(root);
-  return rests.size === 0 ? null : (vertex) => rests.has(roots[vertex]);
+  const remnants = new Set<number>();
+  for (const [root, extent] of extents) if (isRemnant(extent, face)) remnants.add(root);
+  return remnants.size === 0 ? null : (vertex) => remnants.has(roots[vertex]);
 }
 
 /** The positions of the vertices, x y z each, um, world. */
@@ -118,7 +118,7 @@ function components(places: Float32Array, corners: ArrayLike<number>, tile: Box)
   const first = new Map<string, number>();
   for (let vertex = 0; vertex < parents.length; vertex++) {
     const place = places.subarray(3 * vertex, 3 * vertex + 3);
-    if (!isNearFaces(place, tile)) continue; // a component that reaches this far is not a rest
+    if (!isNearFaces(place, tile)) continue; // a component that reaches this far is not a remnant
     const name = place.join();
     connect(vertex, first.get(name) ?? vertex);
     first.set(name, vertex);
@@ -137,7 +137,7 @@ function isNearFaces(place: ArrayLike<number>, { min, max }: Box): boolean {
   });
 }
 
-function isRest(extent: Box3, face: Face): boolean {
+function isRemnant(extent: Box3, face: Face): boolean {
   const size = extent.getSize(new Vector3());
   const length = Math.max(...size);
   const edges = AXES.map((axis) => face.tile.max[axis] - face.tile.min[axis]);

@@ -1,8 +1,8 @@
 /** Finds the eye in the specimen's space, for marks that look equally large at every distance. Pure. */
 import { Matrix4, type PerspectiveCamera, Vector3 } from "three";
-import { type Sight, STEREO_TEXT, screenZoom } from "./style";
+import { type EyeView, STEREO_TEXT, screenZoom } from "./style";
 
-export const NO_SIGHT: Sight = {
+export const NO_EYE_VIEW: EyeView = {
   eye_um: new Vector3(),
   up: new Vector3(0, 1, 0),
   zoom: 1,
@@ -14,11 +14,11 @@ export const NO_SIGHT: Sight = {
  * @param specimen from um to the scene
  * @param screen the flat picture, with its height in CSS pixels; null in stereo
  */
-export function sightOf(
+export function eyeViewOf(
   head: Matrix4,
   specimen: Matrix4,
   screen: Readonly<{ camera: PerspectiveCamera; height_px: number }> | null,
-): Sight {
+): EyeView {
   const toSpecimen = new Matrix4().copy(specimen).invert();
   const zoom = screen === null ? 1 : screenZoom(pxPerRad(screen.camera, screen.height_px));
   return {

@@ -12,7 +12,7 @@ export type FarLamp = Readonly<{
   towards: Vec3;
 }>;
 
-export type RoomLight = Readonly<{
+export type SceneLight = Readonly<{
   key: FarLamp;
   fill: FarLamp;
   sky: Rgb;
@@ -28,7 +28,7 @@ export type RoomLight = Readonly<{
 /**
  * The viewer's own light: a lamp over the user's left shoulder, and a weaker one from the right.
  */
-export const OWN_LIGHT: RoomLight = {
+export const OWN_LIGHT: SceneLight = {
   key: { light: [0.66, 0.62, 0.56], towards: [-1.2, 1.6, 2.5] },
   fill: { light: [0.08, 0.1, 0.14], towards: [1.8, -0.4, 1.8] },
   sky: [0.33, 0.34, 0.37],
