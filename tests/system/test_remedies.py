@@ -101,7 +101,11 @@ def test_bundle_names_a_missing_or_damaged_file_of_the_stage(
     DAMAGES[damage](out / "stage" / name)
     assert main(["bundle", str(out), "--workers", "0"]) == 1
     said = capfd.readouterr().err
-    found = "missing" if damage == "lost" else "damaged, not the bytes that files.json says"
+    found = (
+        "missing"
+        if damage == "lost"
+        else "damaged, because its size or hash differs from files.json"
+    )
     assert f"{out / 'stage' / name}: {found}: " in said
     assert f"run `stereocell stage {out}`" in said
 
@@ -111,7 +115,7 @@ def test_bundle_names_a_missing_or_damaged_file_of_the_stage(
 
 def _follow(out: Path, told: list[str], *, damaged: Path, source: Path) -> None:
     """Run the remedies that `check` prints, and nothing else."""
-    if any(re.search(r"remove (it|what is damaged)", line) for line in told):
+    if any(re.search(r"remove (it|the damaged files)", line) for line in told):
         damaged.unlink(missing_ok=True)
     named = {name for line in told for name in re.findall(r"stereocell (\w+) (?:OUT|INPUT)", line)}
     for name in ("plan", "units", "stage", "bundle", "report"):
