@@ -187,7 +187,7 @@ def test_bundle_without_its_manifest_is_made_again_and_foreign_files_stay(
     own = out / "bundle" / "thesis.tex"
     own.write_text("years of work")
     assert main(["bundle", str(out)]) == 1
-    assert "found something else (thesis.tex), and no manifest.json: " in capfd.readouterr().err
+    assert "found something else (thesis.tex), but no manifest.json, " in capfd.readouterr().err
     assert own.read_text("utf-8") == "years of work"
     own.unlink()
     assert main(["bundle", str(out)]) == 0
