@@ -107,7 +107,7 @@ def test_the_deep_check_measures_the_image_again(
         f"cells: column {measure_of}_DNA differs from the {measure_of} of the voxels of 3, 8"
         in output
     )
-    assert output.count("voxels'") == 1
+    assert output.count(" of the voxels of ") == 1
 
 
 @pytest.mark.slow
