@@ -165,5 +165,5 @@ def test_open_surfaces_are_exported_but_not_as_solids(
     capsys.readouterr()
     assert main(["export", str(bare), str(tmp_path / "open.3mf")]) == 1
     output = capsys.readouterr().err.splitlines()[-1]
-    assert "its surface is open at the block's faces, as --no-caps built it" in output
+    assert "found a surface that is open at the block's faces (--no-caps)" in output
     assert not (tmp_path / "open.3mf").exists()

@@ -251,7 +251,7 @@ def test_last_results_of_a_killed_command_are_made_again_if_the_input_was_writte
     capsys.readouterr()
     assert main(["units", str(out), *INLINE]) == 0
     printed = capsys.readouterr().err
-    assert ("are made again" in printed) == is_changed
+    assert ("are built again" in printed) == is_changed
     assert f"units: {2 if is_changed else 1}/{2 if is_changed else 1}" in printed
     assert not (out / "running.json").exists()
 

@@ -216,7 +216,7 @@ def test_a_given_level_with_all_voxels_on_one_side_has_no_surface_and_a_reason(
         "channels"
     ]
     assert channel["surface"] == "none"
-    assert channel["surface_reason"] == f"no surface: all voxels lie {side} the level {given}"
+    assert channel["surface_reason"] == f"no surface: all voxels lie {side} the iso-value {given}"
     assert channel["tileset"] is None
 
 
@@ -265,7 +265,7 @@ def test_a_mask_of_single_voxels_has_no_surface_and_a_note_says_why(
     assert (
         "half-way; 0% of it is left after a median of 3 x 3 voxels and a Gaussian of 1 um" in output
     )
-    assert "no surface: all voxels lie below the level 127.5" in output
+    assert "no surface: all voxels lie below the iso-value 127.5" in output
     (channel,) = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))["channels"]
     assert channel["surface"] == "none"
 
@@ -279,7 +279,7 @@ def test_a_note_says_that_a_level_without_background_counts_from_0(
     flags = ["--channels", "even", "--config", str(tmp_path / "s.toml"), flag]
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
-    note = "units: even: found no background to subtract: its level counts from 0"
+    note = "units: even: found no background to subtract: its iso-value counts from 0"
     assert note in capsys.readouterr().err
 
 
@@ -337,15 +337,15 @@ def test_an_unknown_surface_is_refused_in_one_line(
     [
         (
             ["--surfaces", "even=inner", "--iso-value", "even=700"],
-            "even: --surfaces chooses the level, so iso-value 700",
+            "even: --surfaces chooses the iso-value, so 700",
         ),
         (
             ["--surfaces", "3=outer,800", "--iso-criterion", "adaptive"],
-            "even 800: --surfaces chooses the level, so adaptive is ignored",
+            "even 800: --surfaces chooses the iso-value, so --iso-criterion adaptive is ignored",
         ),
         (
             ["--iso-value", "3=700", "--iso-scope", "tile"],
-            "even: the settings state its level, so all tiles have the same one, and --iso-scope",
+            "even: the settings state its iso-value, so all tiles have the same one, and",
         ),
     ],
 )

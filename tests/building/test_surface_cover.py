@@ -49,8 +49,8 @@ def test_both_shares_follow_from_the_counts() -> None:
     assert cover.missing == pytest.approx(0.25)
     assert cover.added == pytest.approx(10 / 160)
     assert cover.words == (
-        "the solid covers 75.0% of the source's voxels above the level, and 6.2% of the solid lies "
-        "below it"
+        "the solid covers 75.0% of the source's voxels above the iso-value, and 6.2% of "
+        "the solid lies below it"
     )
     assert (Cover(0, 0, 0).missing, Cover(0, 0, 0).added) == (0, 0)
 

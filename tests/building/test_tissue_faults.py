@@ -151,7 +151,7 @@ def remains(out: Path) -> list[Path]:
 def faults(out: Path) -> list[str]:
     """Return the failed lines of the check, except for intact results of an earlier plan."""
     failed = [line for line in check_module.check(out) if not line.ok]
-    stale = (": made of another ", ": began and did not finish: ")
+    stale = (": made from another ", ": began and did not finish: ")
     return [
         f"{line.name}: {line.detail}"
         for line in failed
@@ -399,7 +399,7 @@ def test_a_class_named_like_a_channel_is_refused_and_earlier_classes_stay(
     model = write_model(tmp_path / "m.onnx", slopes=(-1.0, 1.0), names=["", CHANNEL])
     capfd.readouterr()
     assert tissue(out, "--model", str(model)) == 1
-    assert f"a channel is named '{CHANNEL}', like a class" in only_line(capfd)
+    assert f"found a channel with the name '{CHANNEL}', expected a name" in only_line(capfd)
     assert digests(out) == before
     assert (
         json.loads((out / "tissue" / "tissue.json").read_text("utf-8"))["settings"]["classes"] == 2

@@ -94,7 +94,7 @@ def test_coarser_levels_are_made_again_from_an_edited_finest_level(bundle, edit)
     assert stated["lod1"] != errors_um(bundle)["lod1"]
     other = "channels/CD31/r0_c1/lod1.glb"
     (line,) = edit.lines
-    assert line.startswith("r0_c0/CD31: edited by hand: lod0 (sound); made anew from lod0: lod1 ")
+    assert line.startswith("r0_c0/CD31: edited by hand: lod0 (sound); rebuilt from lod0: lod1 ")
     assert "lod2 within" in line
     assert read((edited / other).read_bytes())[0]["meshes"]  # the neighbour is not touched
     assert chain(edited, "r0_c1") == chain(bundle, "r0_c1")
@@ -128,7 +128,7 @@ def test_an_edited_coarser_level_stays_and_states_its_distance(bundle, edit):
     assert stated["lod2"] >= stated["lod1"]
     (line,) = edit.lines
     assert "lod1 (sound) " in line
-    assert line.endswith(" um from lod0, which is as it was built")
+    assert line.endswith(" um from lod0, which has no edits")
 
 
 def test_other_levels_that_the_artist_edited_stay(edit):
@@ -141,7 +141,7 @@ def test_other_levels_that_the_artist_edited_stay(edit):
     assert np.abs(radii(edited, "lod2") - 1.5 * spheres.RADIUS).max() < 0.05
     assert errors_um(edited)["lod2"] == pytest.approx(0.25 * spheres.RADIUS, rel=0.2)
     (line,) = edit.lines
-    assert "lod2 (sound) stays, " in line
+    assert "lod2 (sound) is kept, " in line
 
 
 def box_mesh(mesh):
@@ -206,7 +206,7 @@ def empty(mesh):
 @pytest.mark.parametrize(
     ("level", "change", "left", "expected"),
     [
-        ("lod0", empty, [], ["lod0 is empty: no surface is left"]),
+        ("lod0", empty, [], ["lod0 is empty, so no surface is left"]),
         ("lod1", empty, ["lod2.glb", "lod0.glb"], ["lod1 is empty and left out"]),
         ("lod0", lambda mesh: mesh.GetPrim().SetActive(False), ["lod2.glb", "lod1.glb"], []),
     ],
@@ -237,7 +237,7 @@ def test_a_transform_of_the_finest_level_alone_is_an_edit(edit):
     )
     for level in ("lod0", "lod1", "lod2"):
         assert np.abs(radii(edited, level, (-1, 2, 0.5)) - spheres.RADIUS).max() < RISE
-    assert "made anew from lod0: lod1" in edit.lines[0]
+    assert "rebuilt from lod0: lod1" in edit.lines[0]
 
 
 @pytest.mark.slow
@@ -252,7 +252,7 @@ def test_edit_in_place_and_flattened_edit_are_recognised(stage, edit, tmp_path):
     own.GetRootLayer().Save()
     lines = write(tmp_path / "own/stage.usda", tmp_path / "a")
     (line,) = lines
-    assert "lod0 (sound); made anew from lod0: lod1" in line
+    assert "lod0 (sound); rebuilt from lod0: lod1" in line
     assert np.abs(radii(tmp_path / "a", "lod2") - 1.25 * spheres.RADIUS).max() < RISE
 
     edit(lambda s: in_level(s, "lod0", swell(1.25)))
@@ -261,7 +261,10 @@ def test_edit_in_place_and_flattened_edit_are_recognised(stage, edit, tmp_path):
     tile.GetVariantSet("lod").SetVariantSelection("lod0")
     whole.Export(str(tmp_path / "flat.usda"))
     lines = write(tmp_path / "flat.usda", tmp_path / "flat")
-    assert "flat.usda: flattened, so edits that no bundle takes over can't be found" in lines[0]
+    assert (
+        "flat.usda: found a flattened stage, which hides the edits that no bundle takes over"
+        in lines[0]
+    )
     assert lines[1:] == ["r0_c0/CD31: edited by hand: lod0 (sound)"]
 
 
@@ -287,7 +290,9 @@ def test_points_that_are_not_numbers_are_refused(edit):
     def spoil(mesh):
         set_points(mesh, lambda points: np.where(points > 9.9, np.nan, points))
 
-    with pytest.raises(StereoCellError, match=r"CD31_r0_c0.points: found nan, expected point3f"):
+    with pytest.raises(
+        StereoCellError, match=r"CD31_r0_c0.points: found nan, expected finite numbers"
+    ):
         edit(lambda s: in_level(s, "lod0", spoil))
 
 
@@ -324,7 +329,7 @@ def test_remade_levels_have_occlusion_and_paint_of_the_edited_level(tmp_path, fi
     )
     lines = write(path, tmp_path / "bundle")
     (line,) = lines
-    assert "made anew from lod0: lod1" in line
+    assert "rebuilt from lod0: lod1" in line
     with loaded(open_stage(tmp_path / "edit.usda"), "r0_c0") as (prim, _):
         _, lod, _ = shown_lods(prim, "CD31").lods
     assert lod.material.color == (1, 1, 1)

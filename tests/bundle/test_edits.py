@@ -148,7 +148,7 @@ def test_points_edited_outside_the_variants_are_named_with_the_remedy(edit):
         points = stage.GetAttributeAtPath("/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0.points")
         points.Set([point + Gf.Vec3f(0, 0, 1) for point in points.Get()])
 
-    words = r"CD31_r0_c0: .* at lod0: edit inside the variant lod=lod0, or override points, "
+    words = r"CD31_r0_c0: .* \(lod0\): edit inside the variant lod=lod0, or override points, "
     with pytest.raises(StereoCellError, match=words):
         edit(change)
 
@@ -228,7 +228,7 @@ def test_emission_reaches_the_surfaces_and_one_outside_its_range_is_refused(edit
     glow = Gf.Vec3f(0, 0.5, 0.25)
     edited = edit(lambda s: put_new(s, f"{CD31}/surface", name, "Color3f", glow))
     assert drawn(edited)["emissiveFactor"] == [0, 0.5, 0.25]
-    with pytest.raises(StereoCellError, match=r"inputs:emissiveColor: .*expected three numbers"):
+    with pytest.raises(StereoCellError, match=r"inputs:emissiveColor is .*expected three numbers"):
         edit(lambda s: put_new(s, f"{CD31}/surface", name, "Color3f", Gf.Vec3f(0, 5, 0)))
 
 
@@ -286,7 +286,9 @@ def test_material_bound_above_the_channels_colours_surfaces_and_is_named(edit, w
     edited = edit(lambda s: bind(s, where))
     (line,) = edit.lines
     assert line.startswith(f"material /Specimen/Mine, bound on {where}, is taken over for surfaces")
-    assert "volumes keep the channels' colours: inputs:color of /Specimen/Channels/NAME" in line
+    assert (
+        "volumes keep the channels' colours: edit inputs:color of /Specimen/Channels/NAME" in line
+    )
     assert factor(edited, "r0_c1") == [0, 1, 0, 1]
     assert (factor(edited) == [0, 1, 0, 1]) == (where != "/Specimen/Tiles/r0_c1")
     assert channel(edited)["color"] == [1.0, 0.2, 0.1]
@@ -296,8 +298,8 @@ def test_material_bound_above_the_channels_colours_surfaces_and_is_named(edit, w
     ("options", "expected"),
     [
         ({"strength": "weakerThanDescendants"}, "the channels' own materials are stronger"),
-        ({"purpose": "preview"}, "it is bound for the purpose 'preview' alone"),
-        ({"purpose": "full"}, "it is bound for the purpose 'full' alone"),
+        ({"purpose": "preview"}, "it is bound only for the purpose 'preview'"),
+        ({"purpose": "full"}, "it is bound only for the purpose 'full'"),
     ],
 )
 def test_a_material_that_reaches_no_surface_is_named(edit, options, expected):
@@ -468,31 +470,31 @@ def test_channel_hidden_in_a_tile_stays_hidden_whatever_is_chosen(bundle, edit, 
     [
         (
             lambda s: choose(s, "r0_c1", lod="lod7"),
-            "/Specimen/Tiles/r0_c1: lod 'lod7', expected one of lod0, lod1, lod2",
+            "/Specimen/Tiles/r0_c1: lod is 'lod7', expected one of lod0, lod1, lod2",
         ),
         (
             lambda s: choose(s, "r0_c1", representation="wire"),
-            "r0_c1: representation 'wire', expected one of mesh, volume, both",
+            "r0_c1: representation is 'wire', expected one of mesh, volume, both",
         ),
         (lambda s: s.SetMetadata("upAxis", "Z"), "upAxis is Z, expected Y"),
         (lambda s: s.SetMetadata("metersPerUnit", 0.01), "metersPerUnit is 0.01, expected 1e-06"),
         (
             lambda s: s.GetAttributeAtPath(f"{CD31}.inputs:color").Set(Gf.Vec3f(1, 2, 0)),
-            r"CD31.inputs:color: \(1, 2, 0\), expected three numbers in 0..1",
+            r"CD31.inputs:color is \(1, 2, 0\), expected three numbers from 0 to 1",
         ),
         (
             lambda s: s.GetAttributeAtPath(f"{CD31}.stereocell:opacityPoints").Set(
                 [(1, 0), (0, 1)]
             ),
-            "CD31.stereocell:opacityPoints: intensities fall",
+            "CD31.stereocell:opacityPoints: found falling intensities",
         ),
         (
             lambda s: s.GetAttributeAtPath(f"{CD31}.stereocell:window").Set(Gf.Vec2f(9, 9)),
-            r"CD31.stereocell:window: \(9, 9\), expected them to rise",
+            r"CD31.stereocell:window is \(9, 9\), expected the first",
         ),
         (
             lambda s: UsdGeom.Imageable(s.GetPrimAtPath("/Specimen/Tiles")).MakeInvisible(),
-            "no tile is visible",
+            "found no visible tile, expected one or more",
         ),
     ],
 )

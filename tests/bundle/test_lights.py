@@ -72,7 +72,7 @@ def test_stage_with_unedited_lights_keeps_the_viewers_own_lamps(bundle):
 def test_stage_without_lights_keeps_the_viewers_lamps_and_a_line_states_it(edit):
     bundle = edit(lambda stage: stage.GetPrimAtPath(LIGHTS).SetActive(False))
     assert lights_of(bundle) is None
-    assert ["no light of its own" in line for line in edit.lines] == [True]
+    assert ["the stage has no visible light" in line for line in edit.lines] == [True]
 
 
 def test_distant_light_is_as_bright_as_usdlux_defines(edit):

@@ -179,14 +179,18 @@ def test_a_specimen_that_is_an_instance_is_refused_with_the_line_to_write(
         group = scene_over({}, tmp_path / "scene.usda")
         group.GetPrimAtPath("/World").GetReferences().AddReference(str(tmp_path / "group.usda"))
     group.GetPrimAtPath(instance).SetInstanceable(True)
-    with pytest.raises(StageError, match=f"{instance}: is an instance, .* instanceable = false"):
+    with pytest.raises(
+        StageError, match=f"{instance}: found an instance, .* set its instanceable to false"
+    ):
         bundle_of(group, tmp_path)
 
 
 def test_a_scene_without_a_specimen_is_refused_before_its_default_prim(tmp_path: Path) -> None:
     stage = write_tiles(tmp_path / "A")
     scene = scene_over({"tile": stage.parent / "tiles/r0_c0/tile.usdc"}, tmp_path / "scene.usda")
-    with pytest.raises(StageError, match=r"no prim /Specimen, expected .* over its stage\.usda"):
+    with pytest.raises(
+        StageError, match=r"found no prim /Specimen, expected the stage\.usda of a build"
+    ):
         bundle_of(scene, tmp_path)
 
 
@@ -219,9 +223,7 @@ def test_a_flattened_stage_whose_prims_were_renamed_is_refused(
     editor.ApplyEdits()
     file = tmp_path / "A/flat.usda"
     flat.GetRootLayer().Export(str(file))
-    with pytest.raises(
-        StereoCellError, match="a surface of the build whose tile, channel or mesh was"
-    ):
+    with pytest.raises(StereoCellError, match="found a renamed tile, channel or mesh, expected"):
         write(file, tmp_path / "bundle")
 
 

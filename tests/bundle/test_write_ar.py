@@ -53,7 +53,7 @@ def test_large_usdz_is_left_out_and_reported(stage, tmp_path, monkeypatch):
     assert not (bundle / "specimen.usdz").exists()
     manifest = load(bundle / "manifest.json")
     assert manifest["usdz"] is None
-    assert "more than the" in manifest["usdz_reason"]
+    assert "above the limit of" in manifest["usdz_reason"]
     assert "specimen.usdz" not in load(bundle / "files.json")
     assert lines == [f"no specimen.usdz: {manifest['usdz_reason']}"]
 

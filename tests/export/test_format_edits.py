@@ -82,7 +82,7 @@ def case_of(what: str) -> EditCase:
         (
             "`displayOpacity` of a mesh",
             ".ply",
-            "primvars:displayOpacity is not taken over: of a ma",
+            "primvars:displayOpacity is not taken over: the file has only the colour of a ma",
         ),
     ],
 )
@@ -137,4 +137,4 @@ def test_a_page_has_the_edits_of_its_bundle(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", str(tmp_path), str(tmp_path / "s.html"), "--strict"]) == 2
-    assert "--strict can't be for .html" in capsys.readouterr().err
+    assert "--strict does not apply to .html" in capsys.readouterr().err

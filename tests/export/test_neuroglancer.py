@@ -36,7 +36,7 @@ WHOLE = (9, 20, 40)  # voxels (z, y, x) of both tiles
 def folder(sphere_stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("precomputed") / "s.precomputed"
     line = export_stage(sphere_stage, path, options=ExportOptions())
-    assert line.endswith("1 scales; mesh: CD31, up to 3 levels")
+    assert line.endswith("1 scales; mesh: CD31, up to 3 levels of detail")
     return path
 
 
@@ -208,9 +208,7 @@ def test_neuroglancer_draws_image_and_mesh(folder: Path, tmp_path: Path) -> None
     neuroglancer = pytest.importorskip("neuroglancer")
     node, chromium = shutil.which("node"), os.environ.get("CHROMIUM") or shutil.which("chromium")
     if not (node and chromium and (VIEWER / "node_modules" / "playwright-core").is_dir()):
-        pytest.skip(
-            "node, chromium and the viewer's packages are not installed: make setup browser"
-        )
+        pytest.skip("node, chromium and the viewer's packages are missing: run make setup browser")
     with served(folder) as url:
         viewer = neuroglancer.Viewer()
         with viewer.txn() as state:

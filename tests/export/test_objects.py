@@ -85,11 +85,11 @@ def test_some_of_many_thin_parts_are_named_and_all_are_counted(
         stage, tmp_path / "o.3mf", options=ExportOptions(scale=1, wall_mm=5)
     ).split("\n")
     assert len(lines) == 3
-    assert lines[2] == f"... and of {len(NAMES) - 1} more parts"
+    assert lines[2] == f"... and {len(NAMES) - 1} more parts with thin bodies"
 
 
 def test_export_of_a_label_maps_volume_is_refused(stage: Path, tmp_path: Path) -> None:
-    with pytest.raises(StageError, match="no volume of cells: of a label map the stage has surf"):
+    with pytest.raises(StageError, match="no volume of cells \\(label maps have only surf"):
         export_stage(stage, tmp_path / "o.nrrd", options=ExportOptions(channels=("cells",)))
 
 

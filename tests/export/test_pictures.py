@@ -50,7 +50,7 @@ def test_a_picture_opens_with_the_channels_that_the_stage_shows(
                 UsdGeom.Imageable(prim).MakeInvisible()
 
     layer, small = edited(show_one), ExportOptions(width=64)
-    note = "CD31 alone, as the viewer opens: --channels takes others"
+    note = "only CD31, as the viewer shows at opening: --channels chooses others"
     for file, options, is_reported in (
         ("s.png", small, True),
         ("t.png", replace(small, channels=("CD31", "Hoechst 33342")), False),

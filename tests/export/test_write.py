@@ -24,16 +24,26 @@ from support.exhaustive import sweep
 def test_an_unknown_ending_and_an_option_of_others_are_refused(
     sphere_stage: Path, tmp_path: Path
 ) -> None:
-    with pytest.raises(UsageError, match=r"s\.fbx: expected a name that ends in \.glb, \.gltf"):
+    with pytest.raises(
+        UsageError,
+        match=r"s\.fbx: found the ending '\.fbx', expected a name that ends in one of \.glb",
+    ):
         export_stage(sphere_stage, tmp_path / "s.fbx", options=ExportOptions())
-    with pytest.raises(UsageError, match=r"--compress can't be for \.stl, expected one of \.glb"):
+    with pytest.raises(
+        UsageError,
+        match=r"--compress does not apply to \.stl, expected a file that ends in one of \.glb",
+    ):
         export_stage(sphere_stage, tmp_path / "s.stl", options=ExportOptions(compress="draco"))
 
 
 def test_unknown_channels_and_tiles_are_refused(sphere_stage: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--channels: no 'CD4', expected of CD31, Hoechst 33342"):
+    with pytest.raises(
+        UsageError, match="--channels names 'CD4', expected one or more of CD31, Hoechst 33342"
+    ):
         export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions(channels=("CD4",)))
-    with pytest.raises(UsageError, match="--tiles: no 'r9_c9' is visible, expected of r0_c0"):
+    with pytest.raises(
+        UsageError, match="--tiles names 'r9_c9', expected visible tiles, one or more of r0_c0"
+    ):
         export_stage(sphere_stage, tmp_path / "s.glb", options=ExportOptions(tiles=("r9_c9",)))
 
 
@@ -65,7 +75,7 @@ def test_missing_folder_of_the_file_is_made(sphere_stage: Path, tmp_path: Path) 
     export_stage(sphere_stage, tmp_path / "for" / "printing" / "s.stl", options=ExportOptions())
     assert [one.name for one in (tmp_path / "for" / "printing").iterdir()] == ["s.stl"]
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=r"file: can't be made: "):
+    with pytest.raises(OutputError, match=r"file: can't be made \("):
         export_stage(sphere_stage, tmp_path / "file" / "s.stl", options=ExportOptions())
 
 
@@ -93,7 +103,7 @@ def test_parts_of_a_build_and_edits_are_not_overwritten(
     edit.write_text("#usda 1.0\n(subLayers = [@./out/stage/stage.usda@])\n")
     for file in (out / "stage" / "stage.usda", out / "stage" / "new.glb", out / "bundle" / "a.glb"):
         assert main(["export", str(out), str(file)]) == 2
-        assert "a part of the build lies there" in capsys.readouterr().err
+        assert "found a part of the build, expected another place" in capsys.readouterr().err
     assert main(["export", str(out), str(edit), "--stage", str(edit)]) == 2
     assert edit.read_text("utf-8").startswith("#usda 1.0\n(subLayers")
     assert main(["export", str(out), str(out / "s.glb"), "--json"]) == 0

@@ -193,5 +193,7 @@ def test_one_level_in_uneven_light_is_unsure_and_the_plan_says_the_same(tmp_path
     assert level.background is None
     assert uneven.appearance.surface == "unsure"
     assert "uneven light" in uneven.appearance.surface_reason
-    (note,) = [note for note in OutFolder(tmp_path / "b" / "out").plan().notes if "level" in note]
-    assert f"unsure level {level.iso:.5g} (" in note
+    (note,) = [
+        note for note in OutFolder(tmp_path / "b" / "out").plan().notes if "iso-value" in note
+    ]
+    assert f"unsure iso-value {level.iso:.5g} (" in note

@@ -55,17 +55,17 @@ def test_the_plan_states_the_near_levels_of_a_small_volume_as_a_build_finds_them
     level = channel.appearance.level
     assert level is not None
     assert channel.near_levels
-    assert f"level {level.iso:.5g} (" in note
-    assert note.endswith(f"near levels: {channel.near_levels}")
+    assert f"iso-value {level.iso:.5g} (" in note
+    assert note.endswith(f"near iso-values: {channel.near_levels}")
 
 
 @pytest.mark.parametrize(
     ("flags", "expected"),
     [
-        (("--iso-value", "0=400"), ["Channel0: level 400, from the settings"]),
+        (("--iso-value", "0=400"), ["Channel0: iso-value 400, from the settings"]),
         (
             ("--iso-value", "0=150+b"),
-            ["Channel0: level 150+b (+b: above the background), from the settings"],
+            ["Channel0: iso-value 150+b (+b: above the background), from the settings"],
         ),
         (
             ("--preset", "em"),
@@ -74,8 +74,8 @@ def test_the_plan_states_the_near_levels_of_a_small_volume_as_a_build_finds_them
         (
             ("--surfaces", "0=900,inner"),
             [
-                "Channel0 900: level 900, from the settings",
-                "Channel0 inner: the build finds the inner level",
+                "Channel0 900: iso-value 900, from the settings",
+                "Channel0 inner: the build finds the inner iso-value",
             ],
         ),
     ],
@@ -91,7 +91,7 @@ def test_the_plan_states_a_single_clear_level_and_the_voxel_size(
 ) -> None:
     out = _planned(tmp_path, _cells((32, 64, 64), core=0))
     (note,) = _level_notes(out)
-    assert re.fullmatch(r"Channel0: clear level [0-9.]+ \([0-9.]+% of the voxels\)", note)
+    assert re.fullmatch(r"Channel0: clear iso-value [0-9.]+ \([0-9.]+% of the voxels\)", note)
     printed = " ".join(capsys.readouterr().err.split())
     assert f"plan: {note}" in printed
     assert "32 x 64 x 64 voxels (z, y, x) of 1 x 1 x 1 um, 1 tile x 1 channel" in printed
@@ -116,8 +116,8 @@ def test_the_plan_calls_a_level_unsure_if_no_tile_has_enough_voxels_above_it(
     lone[20:29, 40:49, 40:49] += 2000
     out = _planned(tmp_path, lone.round().astype(np.uint16))
     (note,) = _level_notes(out)
-    assert note.startswith("Channel0: unsure level ")
-    assert "no tile by itself has enough voxels on both sides of the level" in note
+    assert note.startswith("Channel0: unsure iso-value ")
+    assert "no tile by itself has enough voxels on both sides of the iso-value" in note
     assert main(["units", str(out), "--workers", "0"]) == 0
     (channel,) = read_survey(OutFolder(out)).values()
     assert channel.appearance.surface == "unsure"
@@ -143,12 +143,15 @@ def test_the_plan_counts_the_channels_whose_level_it_does_not_estimate(
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
     notes = OutFolder(tmp_path / "out").plan().notes
     assert (
-        "the plan does not estimate the levels of 2 other channels: the build finds them" in notes
+        "the plan does not estimate the iso-values of 2 other channels: the build finds them"
+        in notes
     )
     monkeypatch.setattr("stereocell.planning.level_estimate.MOST_VOXELS", 1000)
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
     notes = OutFolder(tmp_path / "out").plan().notes
-    assert "the plan does not estimate the levels of the channels: the build finds them" in notes
+    assert (
+        "the plan does not estimate the iso-values of the channels: the build finds them" in notes
+    )
 
 
 def test_blocks_give_nearly_the_same_levels_as_all_voxels(tmp_path: Path) -> None:
@@ -171,7 +174,7 @@ def test_blocks_give_nearly_the_same_levels_as_all_voxels(tmp_path: Path) -> Non
 def test_estimated_levels_are_printed_with_three_digits(tmp_path: Path) -> None:
     out = _planned(tmp_path, _cells((96, 160, 160), core=1200))
     (note,) = _level_notes(out)
-    assert "level about" in note
+    assert "iso-value about" in note
     values = [word for word in note.split() if word.isdigit()]
     assert values == [f"{float(f'{float(value):.3g}'):g}" for value in values]
     assert max(map(float, values)) > 100

@@ -85,7 +85,11 @@ def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_for_a_ct_are_printed
 @pytest.mark.parametrize(
     ("preset", "voxels", "words"),
     [
-        ("ct", _body(24, 1064), "plus 1024, and its level of -300 is meant for Hounsfield units"),
+        (
+            "ct",
+            _body(24, 1064),
+            "plus 1024, and its iso-value of -300 is meant for Hounsfield units",
+        ),
         ("ct-bone", _body(24, 1064), "(or --preset ct-bone --iso-value 0=1324 --window 0=0:3024)"),
         ("ct", _body(20, 180).astype(np.uint8), "8-bit values, which are no Hounsfield units"),
         ("ct-bone", _body(20, 180).astype(np.uint8), "--iso-value 0=VALUE"),
@@ -129,7 +133,7 @@ def test_levels_of_ct_presets_are_ignored_for_values_that_are_not_hounsfield_uni
     plan = OutFolder(out).plan()
     assert (plan.settings.iso_values, plan.settings.windows) == ({}, {})
     assert not plan.is_hounsfield
-    assert sum("its level and window are ignored" in note for note in plan.notes) == 1
+    assert sum("its iso-value and window are ignored" in note for note in plan.notes) == 1
     own = ["--preset", preset, "--iso-value", "0=300", "--window", "0=0:900"]
     assert main(["plan", str(source), "-o", str(tmp_path / "own"), *own]) == 0
     settings = OutFolder(tmp_path / "own").plan().settings
@@ -172,7 +176,7 @@ def test_a_note_doubts_a_stated_ct_with_unsigned_values(tmp_path: Path) -> None:
     chosen, reason = choose_preset(open_dataset(tmp_path / "a.mha"))
     assert chosen == "ct"
     assert reason[0] == "preset ct: the input is CT (or --preset none for the defaults)"
-    assert "plus 1024, and its level of -300 is meant for Hounsfield units" in reason[1]
+    assert "plus 1024, and its iso-value of -300 is meant for Hounsfield units" in reason[1]
     assert "--preset ct --iso-value 0=724 --window 0=0:3024" in reason[1]
 
 

@@ -63,10 +63,10 @@ def test_the_share_of_chunks_that_are_not_stored_is_reported(
     shards, blocks = write_shards(tmp_path / "c.ome.zarr"), write_n5(tmp_path / "a.n5", BODY)
     note = "({}) are not stored: they are read as {}, and the format does not state"
     for path, lost, words in (
-        (chunks, "0/c/1/0/0", "1 of 4 chunks of level 0 " + note.format("25.00%", 0)),
-        (flat, "0/1/2/0/0", "1 of 8 chunks of level 0 " + note.format("12.50%", 0)),
-        (shards, "0/c/0/1/0", "1 of 4 shards of level 0 " + note.format("25.00%", 3)),
-        (blocks, "1/0/1", "1 of 24 blocks of level 0 " + note.format("4.17%", 0)),
+        (chunks, "0/c/1/0/0", "1 of 4 chunks of resolution level 0 " + note.format("25.00%", 0)),
+        (flat, "0/1/2/0/0", "1 of 8 chunks of resolution level 0 " + note.format("12.50%", 0)),
+        (shards, "0/c/0/1/0", "1 of 4 shards of resolution level 0 " + note.format("25.00%", 3)),
+        (blocks, "1/0/1", "1 of 24 blocks of resolution level 0 " + note.format("4.17%", 0)),
     ):
         code, printed = plan(path, tmp_path, capsys)
         assert (code, "not stored" in printed) == (0, False)
@@ -76,7 +76,7 @@ def test_the_share_of_chunks_that_are_not_stored_is_reported(
         assert words in printed
     code, printed = plan(write_hdf5(tmp_path / "a.h5", 6), tmp_path, capsys)
     assert code == 0
-    assert "2 of 8 chunks of level 0 " + note.format("25.00%", 9) in printed
+    assert "2 of 8 chunks of resolution level 0 " + note.format("25.00%", 9) in printed
 
 
 @pytest.mark.slow

@@ -124,7 +124,9 @@ def test_lost_chunks_are_counted_by_the_names_of_the_files(
     path = write(tmp_path / "a.zarr", 2, NAMED[2][1], NAMED[2][0])
     assert "not stored" not in plan(path, tmp_path, capsys)
     (path / "0/1.2.0").unlink()
-    assert "1 of 6 chunks of level 0 (16.67%) are not stored" in plan(path, tmp_path, capsys)
+    assert "1 of 6 chunks of resolution level 0 (16.67%) are not stored" in plan(
+        path, tmp_path, capsys
+    )
 
 
 @pytest.mark.parametrize("place", ["start", "end"])
@@ -143,4 +145,7 @@ def test_chunks_that_a_shard_lacks_are_counted(
     array[4:8, 12:24, 24:36] = 3
     array[8:, :36, :24] = 3  # empties a shard, which zarr-python then deletes
     printed = plan(path, tmp_path, capsys)
-    assert "13 of 48 chunks of level 0 (27.08%) are not stored: they are read as 3" in printed
+    assert (
+        "13 of 48 chunks of resolution level 0 (27.08%) are not stored: they are read as 3"
+        in printed
+    )

@@ -151,7 +151,7 @@ def test_page_has_slices_and_levels_of_each_unit(written: tuple[str, _Page]) -> 
     assert "given" in parsed.texts
     assert "the same in all tiles" in parsed.texts
     assert "1 channel without a surface" in parsed.texts
-    nothing = "empty: no clear surface: nothing stands out: no level has more than a few voxels"
+    nothing = "empty: no clear surface: nothing stands out: no iso-value has more than a few voxels"
     assert any(text.startswith(nothing) for text in parsed.texts)
     assert any(text.startswith("--iso-value twin=") for text in parsed.texts)  # if it is wrong
     assert any(alt.startswith("Contour of twin at ") for alt in parsed.alts)

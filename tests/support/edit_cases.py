@@ -263,7 +263,7 @@ CASES: tuple[EditCase, ...] = (
         "`inputs:color` by a class that a channel specializes",
         _specialize_color,
         "reported",
-        "CD31.inputs:color is not taken over: the stage's own value, in channels.usda, is stronger",
+        "CD31.inputs:color is not taken over: the stage's own value in channels.usda is stronger",
     ),
     EditCase(
         "`inputs:color` over time",
@@ -329,7 +329,8 @@ CASES: tuple[EditCase, ...] = (
         "`displayOpacity` of a mesh by its points",
         _fade,
         "reported",
-        "primvars:displayOpacity is not taken over: one value for the whole mesh is taken over",
+        "primvars:displayOpacity is not taken over: the bundle takes over one value "
+        "for the whole mesh",
     ),
     EditCase(
         "`displayColor` of a mesh",
@@ -353,7 +354,8 @@ CASES: tuple[EditCase, ...] = (
         "`stereocell:lut` of a channel",
         _put(CHANNEL, "stereocell:lut", _Types.Asset, Sdf.AssetPath("./stage.usda")),
         "reported",
-        "stereocell:lut is not taken over: it follows from other values: edit stereocell:opacity",
+        "stereocell:lut is not taken over: it is computed from other values: edit "
+        "stereocell:opacity",
     ),
     EditCase("display name of a channel", _name(CHANNEL, "Vessels"), "taken", "its name"),
     EditCase(
@@ -417,7 +419,7 @@ CASES: tuple[EditCase, ...] = (
         "visibility of a channel's material",
         _put(CHANNEL, "visibility", _Types.Token, "invisible"),
         "reported",
-        "CD31.visibility is not taken over: nothing in the bundle is drawn by this prim",
+        "CD31.visibility is not taken over: this prim draws nothing in the bundle",
     ),
     EditCase(
         "draw mode of a tile",
@@ -511,7 +513,7 @@ CASES: tuple[EditCase, ...] = (
         "an added mesh in a level of detail that is not selected",
         _add_to_a_level,
         "reported",
-        "/r0_c0/Arrow is not taken over: it stands in a variant that is not selected",
+        "/r0_c0/Arrow is not taken over: it is in a variant that is not selected",
     ),
     EditCase(
         "an added mesh or curve without faces",
@@ -523,7 +525,7 @@ CASES: tuple[EditCase, ...] = (
         "an added sphere, cube or other shape without points",
         lambda stage: UsdGeom.Sphere.Define(stage, "/Specimen/Annotations/Ball"),
         "reported",
-        "Sphere /Specimen/Annotations/Ball is not taken over: nothing in the bundle is made of",
+        "Sphere /Specimen/Annotations/Ball is not taken over: the bundle uses no prims of",
     ),
     EditCase(
         "a camera",
@@ -535,7 +537,8 @@ CASES: tuple[EditCase, ...] = (
         "a camera with a roll",
         lambda stage: define_camera(stage, roll_deg=30),
         "reported",
-        "roll of camera 'Close', 30 degrees, is not taken over: the viewer keeps up upright",
+        "roll of camera 'Close', 30 degrees, is not taken over: the viewer keeps the up axis "
+        "vertical",
         is_partial=True,
     ),
     EditCase(
@@ -572,7 +575,8 @@ CASES: tuple[EditCase, ...] = (
         "an added rectangle, disk or cylinder of light",
         lambda stage: UsdLux.RectLight.Define(stage, "/Specimen/Lights/Lamp"),
         "reported",
-        "RectLight /Specimen/Lights/Lamp is not taken over: the viewer's lamps are distant lights",
+        "RectLight /Specimen/Lights/Lamp is not taken over: the viewer has only distant, "
+        "sphere and dome lights",
     ),
     EditCase(
         "`inputs:specular` of a light",

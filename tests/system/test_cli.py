@@ -146,7 +146,9 @@ def test_default_number_of_workers_is_the_number_of_usable_cores(
 def test_help_says_what_a_region_counts(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["build", "--help"])
-    assert "voxels of the level that is built" in " ".join(capsys.readouterr().out.split())
+    assert "voxels of the resolution level that is built" in " ".join(
+        capsys.readouterr().out.split()
+    )
     assert "build" in COMMANDS
 
 

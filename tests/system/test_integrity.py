@@ -203,7 +203,7 @@ def test_flipped_bit_of_the_stage_is_named_by_check(out: Path, name: str, silent
     line = _line(out, "stage hashes")
     assert not line.ok
     assert f"stage/{name}: damaged" in line.detail
-    assert "remove what is damaged and run `stereocell stage OUT`" in line.detail
+    assert "remove the damaged files and run `stereocell stage OUT`" in line.detail
     (out / "stage" / name).unlink()
     assert f"stage/{name}: missing" in _line(out, "stage hashes").detail
 
@@ -226,7 +226,10 @@ def test_no_flipped_bit_of_the_stage_gets_into_the_bundle(
     capfd.readouterr()
     assert main(["bundle", str(out), *FLAGS]) == 1
     printed = capfd.readouterr().err
-    assert f"{name}: damaged, not the bytes that files.json says: remove it and run" in printed
+    assert (
+        f"{name}: damaged, because its size or hash differs from files.json: remove it and run"
+        in printed
+    )
     assert f"`stereocell stage {out}`" in printed
     assert "Traceback" not in printed
     assert not (out / "bundle").exists()
@@ -247,7 +250,7 @@ def test_file_of_the_bundle_with_a_flipped_bit_is_made_again(
 ) -> None:
     _go_on(out)  # makes the bundle from the copied stage
     _flip(out / "bundle" / name)
-    assert f"{name}: not the bytes" in _line(out, "hashes").detail
+    assert f"{name}: its size or hash differs" in _line(out, "hashes").detail
     _go_on(out)
     assert _assets(out) == _assets(built)
 
@@ -289,11 +292,13 @@ def test_layer_edited_in_place_stays_and_is_called_edited_or_damaged(
     capfd.readouterr()
     _go_on(out)
     printed = capfd.readouterr().err
-    assert f"{name}: changed since it was written: edited in place, or damaged: taken as" in printed
+    assert (
+        f"{name}: changed since it was written, by an edit or by damage, and is used as" in printed
+    )
     assert file.read_bytes() == edited
     line = _line(out, "stage hashes")
-    assert f"stage/{name}: changed since it was written: edited in place, or dam" in line.detail
-    assert "edits belong in a layer of your own" in line.detail
+    assert f"stage/{name}: changed since it was written, by an edit or by dam" in line.detail
+    assert "put edits into a layer of your own" in line.detail
     manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
     assert (manifest["channels"][0]["color"] == [1, 0, 0]) == (change is _recolour)
 
@@ -307,7 +312,7 @@ def test_binary_layer_with_a_flipped_bit_gets_into_no_bundle_and_is_not_overwrit
     shutil.rmtree(out / "bundle")
     _flip(file, silent=silent)
     flipped = file.read_bytes()
-    both = "tile.usdc: changed since it was written, not in size: damaged, or edited in place"
+    both = "tile.usdc: changed since it was written but kept its size, by damage or by an edit"
     assert both in _line(out, "stage hashes").detail
     assert main(["stage", str(out), *FLAGS]) == 0
     capfd.readouterr()
@@ -333,7 +338,10 @@ def test_layer_that_no_longer_opens_is_damaged(
     assert "tile.usdc: damaged" in _line(out, "stage hashes").detail
     capfd.readouterr()
     assert main(["bundle", str(out), *FLAGS]) == 1
-    assert "tile.usdc: damaged, not the bytes that files.json says" in capfd.readouterr().err
+    assert (
+        "tile.usdc: damaged, because its size or hash differs from files.json"
+        in capfd.readouterr().err
+    )
     file.unlink()
     _go_on(out)
     assert _assets(out) == _assets(built)

@@ -39,9 +39,9 @@ def test_notes_of_the_reader_are_printed_and_kept(
 _CHOICE = (
     "preset mri: voxels of 1 mm, no Hounsfield units, and no modality is stated: MR is assumed"
 )
-_SHIFTED = "values like Hounsfield units plus 1024, and its level of 300 is meant for"
+_SHIFTED = "values like Hounsfield units plus 1024, and its iso-value of 300 is meant for"
 _IGNORED = (
-    "NIfTI: the settings state its level, so all tiles have the same one, and --iso-scope tile"
+    "NIfTI: the settings state its iso-value, so all tiles have the same one, and --iso-scope tile"
 )
 
 

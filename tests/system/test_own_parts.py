@@ -88,8 +88,8 @@ def test_users_own_settings_in_out_are_not_replaced(
     plan = ["plan", str(builds / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
     assert main(plan) == 1
     line = error_line(capfd)
-    assert f"{file}: was written or changed by hand" in line
-    assert "give it by --config, or --force replaces it" in line
+    assert f"{file}: found a file that was edited by hand" in line
+    assert "pass it by --config, or --force replaces it" in line
     assert file.read_text("utf-8") == own
     assert main([*plan, "--force"]) == 0
     assert file.read_bytes() == (builds / "f" / "stereocell.toml").read_bytes()
@@ -141,7 +141,7 @@ def test_layer_edited_in_place_is_not_written_again_without_force(
     capfd.readouterr()
     assert main(["stage", str(out), *FLAGS]) == 1
     line = error_line(capfd)
-    assert "looks/channels.usda: changed since it was written: edited in place" in line
+    assert "looks/channels.usda: changed since it was written, by an edit" in line
     assert "or --force replaces it" in line
     assert looks.read_bytes() == edited
     assert main(["stage", str(out), *FLAGS, "--force"]) == 0
@@ -188,7 +188,10 @@ def test_damaged_published_page_is_named_by_check(builds: Path, tmp_path: Path) 
     packed = next(site.rglob("*.json.gz"))
     packed.write_bytes(packed.read_bytes()[:-1])
     (fault,) = [line.detail for line in check(site) if not line.ok]
-    assert f"{packed.relative_to(site)}: not the bytes that stereocell-published.json says" in fault
+    assert (
+        f"{packed.relative_to(site)}: its size or hash differs from stereocell-published.json"
+        in fault
+    )
 
 
 @pytest.mark.parametrize("name", ["cells.stl", "cells.gltf", "cells.nrrd"])
@@ -265,13 +268,13 @@ def test_mixed_results_of_two_plans_fail_check_and_publish(
         assert main(command) == 0
         faults = [line.detail for line in check(out) if line.name == "records" and not line.ok]
         assert len(faults) == 1
-        assert f"{out / stale}: made of another " in faults[0]
+        assert f"{out / stale}: made from another " in faults[0]
         assert f"run `stereocell {stale} OUT" in faults[0]
         capfd.readouterr()
         for source in (out, out / "bundle"):
             assert main(["publish", str(source), str(site)]) == 1
             line = error_line(capfd)
-            assert f"{stale}: made of another " in line
+            assert f"{stale}: made from another " in line
             # The remedy names the build round the bundle, too.
             assert f"run `stereocell {stale} {out}" in line
             assert line.endswith(f"stereocell report {out}`")

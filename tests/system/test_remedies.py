@@ -101,7 +101,11 @@ def test_bundle_names_a_missing_or_damaged_file_of_the_stage(
     DAMAGES[damage](out / "stage" / name)
     assert main(["bundle", str(out), "--workers", "0"]) == 1
     printed = capfd.readouterr().err
-    found = "missing" if damage == "lost" else "damaged, not the bytes that files.json says"
+    found = (
+        "missing"
+        if damage == "lost"
+        else "damaged, because its size or hash differs from files.json"
+    )
     assert f"{out / 'stage' / name}: {found}: " in printed
     assert f"run `stereocell stage {out}`" in printed
 
@@ -111,7 +115,7 @@ def test_bundle_names_a_missing_or_damaged_file_of_the_stage(
 
 def _follow(out: Path, lines: list[str], *, damaged: Path, source: Path) -> None:
     """Run the remedies that `check` prints, and nothing else."""
-    if any(re.search(r"remove (it|what is damaged)", line) for line in lines):
+    if any(re.search(r"remove (it|the damaged files)", line) for line in lines):
         damaged.unlink(missing_ok=True)
     named = {name for line in lines for name in re.findall(r"stereocell (\w+) (?:OUT|INPUT)", line)}
     for name in ("plan", "units", "stage", "bundle", "report"):
@@ -183,7 +187,7 @@ def test_bundle_without_its_manifest_is_made_again_and_foreign_files_stay(
     own = out / "bundle" / "thesis.tex"
     own.write_text("years of work")
     assert main(["bundle", str(out)]) == 1
-    assert "found something else (thesis.tex), and no manifest.json: " in capfd.readouterr().err
+    assert "found something else (thesis.tex), but no manifest.json, " in capfd.readouterr().err
     assert own.read_text("utf-8") == "years of work"
     own.unlink()
     assert main(["bundle", str(out)]) == 0

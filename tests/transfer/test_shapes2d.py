@@ -250,7 +250,7 @@ MANY = Vt.Vec4fArray([Gf.Vec4f(0, 1, 0, 1)] * (MAX_SHAPES + 1))
     [
         (
             {"shapeKinds": Vt.TokenArray(["triangle"])},
-            r"shapeKinds: 1 entries, expected 2, as stereocell:shapes has",
+            r"shapeKinds: found 1 entries, expected 2, one for each shape in stereocell:shapes",
         ),
         (
             {"shapeKinds": Vt.TokenArray(["triangle", "disc"])},
@@ -261,18 +261,18 @@ MANY = Vt.Vec4fArray([Gf.Vec4f(0, 1, 0, 1)] * (MAX_SHAPES + 1))
             r"shapes: shape 1: values are \(0.9, 0.1\), expected them to rise within 0..1",
         ),
         ({"shapeTips": Vt.FloatArray([0.1, 7])}, "shapes: shape 1: tip is 7, expected 0..1"),
-        ({"shapeTips": Vt.FloatArray([0.1])}, "shapeTips: 1 entries, expected 2"),
-        ({"shapeSoftness": Vt.FloatArray([0, 0, 0])}, "shapeSoftness: 3 entries, expected 2"),
+        ({"shapeTips": Vt.FloatArray([0.1])}, "shapeTips: found 1 entries, expected 2"),
+        ({"shapeSoftness": Vt.FloatArray([0, 0, 0])}, "shapeSoftness: found 3 entries, expected 2"),
         (
             {"shapeColors": Vt.Vec4fArray([Gf.Vec4f(1, 1, 1, 3)] * 2)},
             "shapes: shape 0: opacity is 3, expected 0..1",
         ),
         (
             {"shapes": MANY, "shapeKinds": Vt.TokenArray(["triangle"] * len(MANY))},
-            "shapes: 33 shapes, expected 32 at most",
+            "shapes: found 33 shapes, expected at most 32",
         ),
-        ({"gradientMax": 0.0}, "gradientMax: 0, expected it above 0"),
-        ({"gradientMax": float("nan")}, "gradientMax: nan, expected it above 0"),
+        ({"gradientMax": 0.0}, "gradientMax is 0, expected a number above 0"),
+        ({"gradientMax": float("nan")}, "gradientMax is nan, expected a number above 0"),
     ],
 )
 def test_the_error_for_a_faulty_edit_is_one_line(
@@ -415,4 +415,4 @@ def test_a_build_suggests_the_boundary_or_gives_the_reason_for_none(
     assert "arcs: shape 0: values are" in line_of(out).detail
     content["functions"]["other"] = content["functions"].pop(NAME)
     file.write_text(json.dumps(content))
-    assert "functions are other, the manifest says arcs" in line_of(out).detail
+    assert "found functions other, expected arcs as in the manifest" in line_of(out).detail

@@ -81,7 +81,7 @@ def test_display_stage_is_valid_and_follows_a_moved_folder(
     assert [error.GetMessage() for error in found] == []
     layer = Sdf.Layer.FindOrOpen(str(stage_path.with_name("display.usda")))
     assert list(layer.GetExternalReferences()) == ["./stage.usda"]
-    assert "10000 times the specimen, whose size is 9 x 12 x 8 um" in layer.documentation
+    assert "enlarged 10000 times. The size of the specimen is 9 x 12 x 8 um" in layer.documentation
 
 
 def test_root_states_the_same_asset_as_the_stage(stage_path: Path) -> None:

@@ -61,9 +61,9 @@ def test_bundle_and_export_report_a_layer_without_units(stage_path: Path, tmp_pa
 @pytest.mark.parametrize(
     ("fields", "remedy"),
     [
-        ("metersPerUnit = 1", "expected 1e-06: write metersPerUnit = 1e-6 there"),
-        ('upAxis = "Z"', 'expected Y: write upAxis = "Y" there'),
-        ('defaultPrim = "Other"', 'expected Specimen: write defaultPrim = "Specimen" there'),
+        ("metersPerUnit = 1", "expected 1e-06: write metersPerUnit = 1e-6, because"),
+        ('upAxis = "Z"', 'expected Y: write upAxis = "Y", because'),
+        ('defaultPrim = "Other"', 'expected Specimen: write defaultPrim = "Specimen", because'),
     ],
 )
 def test_another_unit_axis_or_prim_is_refused_with_the_line_to_write(

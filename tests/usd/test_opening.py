@@ -39,7 +39,7 @@ def test_an_edited_cut_is_taken_over_and_one_without_direction_is_refused(tmp_pa
     attribute.Set(Gf.Vec4d(0, 0, -2, 6))
     assert opening_cut_of(stage) == ((0, 0, -1), 3)
     attribute.Set(Gf.Vec4d(0, 0, 0, 6))
-    with pytest.raises(StageError, match=r"openingCut: .*expected a plane"):
+    with pytest.raises(StageError, match=r"openingCut: .*expected the normal"):
         opening_cut_of(stage)
 
 

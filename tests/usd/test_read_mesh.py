@@ -122,10 +122,10 @@ def test_mesh_without_faces_is_none(cube):
 @pytest.mark.parametrize(
     ("counts", "indices", "words"),
     [
-        ([4], [0, 1, 2], "don't fit 3 faceVertexIndices"),
-        ([3], [0, 1, 8], "outside its 8 points"),
-        ([3], [-1, 0, 1], "outside its 8 points"),
-        ([2], [0, 1], "don't fit"),
+        ([4], [0, 1, 2], "found 3 faceVertexIndices, expected 4"),
+        ([3], [0, 1, 8], "from 0 to 8, expected 0 to 7"),
+        ([3], [-1, 0, 1], "from -1 to 1, expected 0 to 7"),
+        ([2], [0, 1], "found a face of 2 corners, expected at least 3"),
     ],
 )
 def test_contradictions_are_named(cube, counts, indices, words):
@@ -137,5 +137,5 @@ def test_contradictions_are_named(cube, counts, indices, words):
 
 def test_wrong_number_of_normals_is_named(cube):
     cube.CreateNormalsAttr([(0, 0, 1)] * 3)
-    with pytest.raises(StageError, match="/Cube: 3 normals for 8 points"):
+    with pytest.raises(StageError, match="/Cube: found 3 normals, expected 8"):
         read_mesh(cube, np.eye(4))

@@ -163,8 +163,8 @@ def test_faults_of_a_usdz_are_found(stage_path: Path, small: Path, tmp_path: Pat
     (line,) = [line for line in check(build) if line.name == "usdz"]
     assert not line.ok
     text = " ".join(str(finding) for finding in validate_usdz(packed))
-    assert "metersPerUnit 0.01 and upAxis Y, expected 1.0 and Y" in text
-    assert "no client of usdz draws volumes" in text
+    assert "metersPerUnit is 0.01 and upAxis is Y, expected 1.0 and Y" in text
+    assert "no program draws volumes of usdz" in text
     assert "usdUtilsValidators" in text  # USD finds the file whose bytes are not aligned
 
 

@@ -51,7 +51,7 @@ def test_normals_turned_by_five_degrees_are(fins: Mesh, tmp_path: Path) -> None:
     ).astype(np.float32)
     assert _faults(alike, alike, tmp_path) == []
     [faults] = _faults(alike, replace(alike, normals=turned), tmp_path)
-    assert faults.endswith("% of its area is shaded by other normals")
+    assert faults.endswith("% of its area has other normals")
 
 
 def test_a_file_that_states_more_rows_than_memory_holds_is_refused(

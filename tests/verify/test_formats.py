@@ -93,7 +93,7 @@ def test_checks_that_need_no_node_pass(made):
 @pytest.mark.parametrize("name", [".", "missing"])
 def test_a_folder_without_a_build_is_one_error(tmp_path, name):
     with pytest.raises(
-        OutputError, match=r"holds no build, expected plan\.json, stage/ and bundle/, or a bundle's"
+        OutputError, match=r"found no build, expected plan\.json, stage/ and bundle/, or a bundle's"
     ):
         lines(tmp_path / name)
 
@@ -128,7 +128,7 @@ def test_changed_byte_is_found(out, name):
     change_byte(out / "bundle" / name)
     found = lines(out)
     assert "hashes" in failed(found)
-    assert f"{name}: not the bytes" in found["hashes"].detail
+    assert f"{name}: its size or hash differs" in found["hashes"].detail
 
 
 def test_a_changed_byte_of_a_surface_contradicts_its_tileset(out):
@@ -136,7 +136,7 @@ def test_a_changed_byte_of_a_surface_contradicts_its_tileset(out):
     found = lines(out)
     assert "tilesets" in failed(found)
     detail = found["tilesets"].detail
-    assert "CD31/tileset.json: r0_c0/lod0.glb: expected sha-256-128 " in detail
+    assert "CD31/tileset.json: r0_c0/lod0.glb: found sha-256-128 " in detail
     assert "lod1.glb" not in detail
 
 
@@ -146,7 +146,7 @@ def test_a_changed_byte_of_a_level_contradicts_its_list(out):
     found = lines(out)
     assert "volume lists" in failed(found)
     detail = found["volume lists"].detail
-    assert f"{VOLUME}: level 0: expected SHA-256 " in detail
+    assert f"{VOLUME}: resolution level 0: found SHA-256 " in detail
     assert "level 1" not in detail
 
 
@@ -154,7 +154,7 @@ def test_surface_without_a_hash_is_found(out):
     path = out / "bundle" / "channels/CD31/tileset.json"
     path.write_text(path.read_text("utf-8").replace("sha-256-128", "md5", 1))
     found = lines(out)
-    assert "has no hash, expected extras.sha-256-128" in found["tilesets"].detail
+    assert "found no hash, expected extras.sha-256-128" in found["tilesets"].detail
 
 
 def test_level_without_a_hash_is_found(out):
@@ -171,7 +171,7 @@ def test_missing_and_unlisted_files_are_found(out):
     found = lines(out)
     assert {"hashes", "tilesets"} <= failed(found)
     assert f"{GLB}: missing" in found["hashes"].detail
-    assert "lost.glb: not in files.json" in found["hashes"].detail
+    assert "lost.glb: found a file that files.json does not list" in found["hashes"].detail
     assert "no file at r0_c0/lod0.glb" in found["tilesets"].detail
 
 
@@ -199,14 +199,14 @@ def test_level_that_lies_elsewhere_is_found(out):
     offset = text.split('"offset":')[1].split(",")[0]
     path.write_text(text.replace(f'"offset":{offset}', f'"offset":{int(offset) + 1}', 1))
     found = lines(out)
-    assert "lie elsewhere" in found["volume lists"].detail
+    assert "found other offsets of resolution levels" in found["volume lists"].detail
 
 
 def test_tileset_whose_errors_grow_is_found(out):
     path = out / "bundle" / "channels/CD31/tileset.json"
     path.write_text(path.read_text("utf-8").replace('"geometricError":0.0', '"geometricError":9.0'))
     found = lines(out)
-    assert "larger geometricError" in found["tilesets"].detail
+    assert "geometricError is 9, expected at most" in found["tilesets"].detail
 
 
 @pytest.mark.slow
@@ -293,7 +293,7 @@ def test_lost_closed_copy_is_found(out, with_copies):
     with_copies.unlink()
     found = lines(out)
     detail = found["stage files"].detail
-    assert detail.startswith(f"{with_copies}: missing, expected as surface.closed_tiles is on")
+    assert detail.startswith(f"{with_copies}: missing, expected because surface.closed_tiles is on")
     assert "Hoechst" not in detail
 
 
@@ -360,8 +360,8 @@ def test_a_table_that_is_too_short_and_rows_that_are_not_there_are_named(cells):
     content["tiles"]["r0_c1"]["more"] = [object_bundle.COUNT]
     path.write_text(json.dumps(content))
     detail = lines(cells)["object tables"].detail
-    assert "0_volume_um3.u8 has 60 bytes, expected 61" in detail
-    assert "r0_c1: names rows beyond the 61" in detail
+    assert "0_volume_um3.u8: found 60 bytes, expected 61" in detail
+    assert "r0_c1: found row" in detail
 
 
 def test_parts_of_a_column_that_are_others_than_stated_are_named(cells):
@@ -373,7 +373,7 @@ def test_parts_of_a_column_that_are_others_than_stated_are_named(cells):
     assert lines(cells)["object tables"].ok
     column["parts"] = ["0" * 64]
     path.write_text(json.dumps(content))
-    assert "2_CD8.f32: parts have other SHA-256 than stated" in lines(cells)["object tables"].detail
+    assert "2_CD8.f32: found other SHA-256 of its parts" in lines(cells)["object tables"].detail
 
 
 def test_a_column_that_is_damaged_is_named(cells):

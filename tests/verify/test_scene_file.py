@@ -72,53 +72,56 @@ def test_a_scene_passes_by_the_checks_of_its_page_and_of_its_bundle(
 
 DAMAGES: dict[str, tuple[Callable[[str], str], str]] = {
     "a part is missing": (lambda s: s[: len(s) // 2], r"ends before </html>"),
-    "a file of the bundle": (lambda s: flip(s, f'data-file="{LUT}"'), rf"{LUT}: has SHA-256"),
-    "a file of the viewer": (lambda s: flip(s, "data-page="), r"index-1\.css: has SHA-256"),
+    "a file of the bundle": (lambda s: flip(s, f'data-file="{LUT}"'), rf"{LUT}: found SHA-256"),
+    "a file of the viewer": (lambda s: flip(s, "data-page="), r"index-1\.css: found SHA-256"),
     "a block of another form": (
         lambda s: s.replace(f'data-file="{LUT}"', f'data-file="{LUT}" ', 1),
-        r"a block is not as `stereocell export` writes it",
+        r"found a block that `stereocell export` does not write",
     ),
     "another size": (lambda s: s.replace('data-bytes="', 'data-bytes="1', 1), r"bytes, expected 1"),
     "another script": (
         lambda s: s.replace("startViewer(page,", "startViewer(pages,", 1),
-        r"its script is not the one of its policy",
+        r"found a script that the policy does not allow",
     ),
     "a policy that names a host": (
         lambda s: s.replace("connect-src data:", f"connect-src {HOST} data:", 1),
-        rf"its policy lets connect-src reach {HOST}",
+        rf"found {HOST} in connect-src of the policy, expected nothing",
     ),
     "no policy": (
         lambda s: re.sub(r"<meta http-equiv=[^>]*>", "", s, count=1),
-        r"the page has 0 policies",
+        r"found 0 policies",
     ),
     "a picture of a host": (
         lambda s: s.replace('<div id="app">', f'<img src="{HOST}"><div id="app">', 1),
-        r"the page has an element <img>",
+        r"found an element <img>, expected none",
     ),
     "a style of a host": (
         lambda s: s.replace('href="data:,"', f'href="{HOST}"', 1),
-        rf"<link> names the address {HOST}",
+        rf"found the address {HOST} in <link>, expected none",
     ),
     "a way to another page": (
         lambda s: s.replace(
             "</title>", f'</title><meta http-equiv="refresh" content="0;url={HOST}">', 1
         ),
-        r"the page has <meta http-equiv=refresh>",
+        r"found <meta http-equiv=refresh>, expected only the policy",
     ),
     "a view that is an address": (lambda s: s.replace(VIEW, HOST, 1), r"its view is https"),
     "a file that is missing": (lambda s: with_block(s, LUT, "", b""), rf"{LUT}: missing"),
     "a file twice": (
         lambda s: s.replace("</body>", block(FILE, LUT, b"", False) + "</body>", 1),
-        rf"{LUT}: is there twice",
+        rf"{LUT}: found two blocks",
     ),
-    "a file of other bytes": (lambda s: with_block(s, LUT, LUT, b"x"), rf"{LUT}: not the bytes"),
+    "a file of other bytes": (
+        lambda s: with_block(s, LUT, LUT, b"x"),
+        rf"{LUT}: its size or hash differs",
+    ),
     "a path outside": (
         lambda s: with_block(s, LUT, "../outside", b"x"),
-        r"\.\./outside: expected a path within the bundle",
+        r"\.\./outside: found a path outside of the bundle, expected one within it",
     ),
     "a block that grows without end": (
         lambda s: with_block(s, LUT, LUT, gzip.compress(bytes(100 * len(s))), True),
-        rf"{LUT}: does not unpack within",
+        rf"{LUT}: found cut-off data, or more than",
     ),
 }
 

@@ -46,13 +46,13 @@ def require_input(plan: Plan) -> None:
     levels, channels = len(dataset.levels), len(dataset.channels)
     if plan.level >= levels or any(c.index >= channels for c in plan.channels if not c.source):
         raise SourceError(
-            f"{plan.name}: found {levels} levels and {channels} channels, expected the level and "
-            "channels of the plan: plan into another OUT"
+            f"{plan.name}: found {levels} resolution levels and {channels} channels, expected "
+            "those of the plan: plan into another OUT"
         )
     if any(a > b for a, b in zip(plan.region.stop, dataset.levels[plan.level].shape, strict=True)):
         raise SourceError(
-            f"{plan.name}: level {plan.level} is smaller than the plan's region: plan into another "
-            "OUT"
+            f"{plan.name}: found resolution level {plan.level} smaller than the plan's region, "
+            "expected it at least as large: plan into another OUT"
         )
 
 
@@ -76,8 +76,8 @@ def require_added(plan: Plan) -> None:
             channel.fingerprint
         ):
             raise SourceError(
-                f"{channel.source}: channel {channel.name!r} changed since it was planned: run the "
-                "command again that made it (`stereocell tissue OUT`)"
+                f"{channel.source}: channel {channel.name!r} changed since it was planned: run "
+                "`stereocell tissue OUT` again"
             )
 
 

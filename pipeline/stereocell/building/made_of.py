@@ -50,7 +50,7 @@ def find_stale(out_folder: OutFolder) -> str | None:
         if now and entry.get(FIELD, now) != now:
             words = " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
             return (
-                f"{out_folder.out / name}: made of another {words} than {out_folder.out} holds "
+                f"{out_folder.out / name}: made from another {words} than {out_folder.out} has "
                 f"now: {_remedy(name)}"
             )
     return None

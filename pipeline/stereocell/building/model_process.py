@@ -123,6 +123,6 @@ class _ChildSession:
         except ChildError as error:
             raise SourceError(
                 f"{self._path}: {error} while it was {doing}, expected at most "
-                f"{self._bounds.seconds:g} s a patch and {self._bounds.memory_gb:g} GB: if the "
-                "network needs more, raise --model-seconds or --model-memory-gb"
+                f"{self._bounds.seconds:g} s for each patch and {self._bounds.memory_gb:g} GB: "
+                "raise --model-seconds or --model-memory-gb if the network needs more"
             ) from None

@@ -49,7 +49,7 @@ def require_build_or_nothing(out: Path, source: str | Path) -> None:
     """
     found = contents_of(out)
     if found.kind in (Kind.FILE, Kind.SCENE):
-        raise OutputError(f"{out}: found {found.words}, expected a folder")
+        raise OutputError(f"{out}: found {found.words}, expected a folder: choose another OUT")
     beside = {Path(source).name} if Path(source).parent.resolve() == out.resolve() else set()
     others = {name for name in workspace.names_in(out) if not name.startswith(".")} - beside
     if others and found.kind is not Kind.BUILD:
@@ -83,8 +83,8 @@ class OutFolder:
         path = str(self.out.absolute())
         if _CONTROL.search(path):
             raise UsageError(
-                f"OUT is {path!r}, expected a path without control characters, because USD can't "
-                "read them"
+                f"OUT is {path!r}, expected a path without control characters, which USD can't "
+                "read: choose another OUT"
             )
 
     def require_writable(self) -> None:
@@ -96,7 +96,8 @@ class OutFolder:
             probe.unlink()
         except OSError as error:
             raise OutputError(
-                f"{self.out}: can't be written ({error.strerror}), expected a folder of your own"
+                f"{self.out}: can't be written ({error.strerror}), expected a folder of your own: "
+                "choose another OUT"
             ) from None
 
     # --- files, which may be objects of an object storage
@@ -253,7 +254,7 @@ class OutFolder:
         if not workspace.is_file(self.phases_file):
             return None
         try:
-            read_sealed(self.phases_file, PHASES, "so no phase counts as done")
+            read_sealed(self.phases_file, PHASES, "all phases run again")
         except OutputError as fault:
             return str(fault)
         return None

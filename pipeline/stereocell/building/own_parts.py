@@ -79,8 +79,8 @@ def no_layer(path: Path, *, is_given: bool) -> OutputError:
     """
     found = contents_of(path)
     fault = f"{path} is missing" if found.kind is Kind.NOTHING else f"{path}: found {found.words}"
-    remedy = "expected a USD layer" if is_given else "run `stereocell stage OUT` first"
-    return OutputError(f"{fault}: {remedy}")
+    remedy = ", expected a USD layer" if is_given else ": run `stereocell stage OUT` first"
+    return OutputError(f"{fault}{remedy}")
 
 
 def require_own_report(out_folder: OutFolder) -> None:

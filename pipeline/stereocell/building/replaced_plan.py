@@ -53,8 +53,8 @@ def require_own_settings(out_folder: OutFolder, plan: Plan, there: Plan | None) 
         found = None
     if found is None or found not in (plan.settings, there and there.settings):
         raise OutputError(
-            f"{file}: was written or changed by hand, expected the record of an earlier plan: "
-            + or_force("move it elsewhere and give it by --config")
+            f"{file}: found a file that was edited by hand, expected the record of an earlier "
+            "plan: " + or_force("move it elsewhere and pass it by --config")
         )
 
 

@@ -36,8 +36,8 @@ def remove_mixed(out_folder: OutFolder, plan: Plan) -> None:
         return
     if left["inputs"] != _digest(plan):
         console.print(
-            "units: an input changed after an earlier command had begun to read it and was "
-            "stopped: the last results of that command are made again"
+            "units: an earlier command was stopped while it read an input, and the input changed "
+            "since then: the last results of that command are built again"
         )
         for result in (out_folder.out / name for name in left["results"]):
             if result.is_relative_to(out_folder.units_dir) and ".." not in result.parts:

@@ -25,7 +25,7 @@ from stereocell.usd import written_files
 
 _PLAN_AGAIN = "run `stereocell plan INPUT -o OUT` again"
 UNITS_AGAIN = "run `stereocell units OUT`"
-_EXPORTS_AGAIN = "remove it: the next export of each file then takes --force"
+_EXPORTS_AGAIN = "remove it, and export each file once with --force"
 _REPORT_AGAIN = "run `stereocell report OUT` again"
 # For each command, the parts of OUT that it depends on.
 NEEDS = {

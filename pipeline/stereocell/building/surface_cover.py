@@ -20,10 +20,10 @@ from stereocell.steps.unit_files import cover_of, load_record
 # Remedies for a surface that leaves out much. They were tried on a CT of a trunk with voxels of
 # 3 mm, at 300 HU. The first reduced the part left out from 59 % to 17 %, both together to 5 %.
 REMEDY = (
-    "in a file for --config, under [surface], max_shift = 0.02 keeps thin structures, and "
-    "min_diagonal_um = 0 with max_fragment_um = 0 keeps small ones"
+    "in a file for --config, under [surface], write max_shift = 0.02 to keep thin structures, "
+    "and min_diagonal_um = 0 and max_fragment_um = 0 to keep small ones"
 )
-NO_REMEDY = "settings that keep them would keep much of this noise, too"
+NO_REMEDY = "settings that keep such structures would also keep much of this noise"
 # Least number of voxels of structure for each voxel of noise at which the remedy is advised. With
 # 60 dim nuclei in noise the remedy makes 54 times as many triangles, most of them noise.
 LEAST_GAIN = 3.0
@@ -89,8 +89,8 @@ def notes_on_cover(out_folder: OutFolder, plan: Plan) -> list[str]:
             )
             notes.append(
                 f"{channel.name}: its surface leaves out {found.missing:.0%} of the source's "
-                f"voxels above its level{noise}: filters and cleaning remove thin and small "
-                f"structures; {found.remedy}"
+                f"voxels above its iso-value{noise}, because filters and cleaning remove thin and "
+                f"small structures: {found.remedy}"
             )
     return notes
 

@@ -83,8 +83,8 @@ def add_tissue(out: Path, request: TissueRequest) -> Plan:
     voxels = math.prod(plan.region.shape)
     if voxels > MAX_VOXELS:
         raise UsageError(
-            f"tissue: the region holds {voxels:,} voxels, expected at most {MAX_VOXELS:,}: plan a "
-            "coarser --level or a smaller --region"
+            f"tissue: found {voxels:,} voxels in the region, expected at most {MAX_VOXELS:,}: plan "
+            "a coarser --level or a smaller --region"
         )
     with ExitStack() as stack:
         network = None
@@ -199,8 +199,8 @@ def _require_free(names: Sequence[str], plan: Plan) -> None:
     for name in names:
         if name in taken:
             raise SourceError(
-                f"{plan.name}: a channel is named {name!r}, like a class of tissue, expected no "
-                "channel of this name"
+                f"{plan.name}: found a channel with the name {name!r}, expected a name that no "
+                "class of tissue has: rename the channel, or plan without it"
             )
 
 

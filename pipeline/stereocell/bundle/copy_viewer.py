@@ -22,6 +22,9 @@ def copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
             continue
         path = inside.as_posix()
         if path in (MANIFEST, FILES) or (root / path).exists():
-            raise OutputError(f"{source}: the bundle has a {path} of its own")
+            raise OutputError(
+                f"{source}: found the name of a file of the bundle, {path}, expected another: "
+                "rename the viewer's file"
+            )
         refs.append(write_file(root, path, source.read_bytes()))
     return refs

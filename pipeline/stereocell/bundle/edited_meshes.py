@@ -93,13 +93,15 @@ def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
     lods = list(read_lods(tile, channel_id))
     emptied = find_emptied(tile, channel_id)
     if emptied and (not lods or emptied[0] < lods[0].level):
-        return Shown((), f"edited by hand: lod{emptied[0]} is empty: no surface is left")
+        return Shown((), f"edited by hand: lod{emptied[0]} is empty, so no surface is left")
     edited = _edited_levels(lods)
     remarks = [f"lod{level} is empty and left out" for level in emptied]
     if edited:
         if not np.isfinite(np.concatenate([lod.mesh.positions for lod in lods])).all():
             prim = f"{tile.GetPath()}/{channel_id}/{channel_id}_{tile.GetName()}"
-            raise StageError(f"{prim}.points: a number that is not finite, expected places in um")
+            raise StageError(
+                f"{prim}.points: found a number that is not finite, expected finite positions in um"
+            )
         lods, changes = _follow(tile, channel_id, lods, edited)
         remarks = [*changes, *remarks, *_odd_units(tile, channel_id, min(edited))]
     line = f"edited by hand: {'; '.join(remarks)}" if remarks else ""
@@ -139,7 +141,7 @@ def _follow(
 
     def describe(lod: ComposedLod) -> str:
         _, defects = _certified(read_local(tile, channel_id, lod.level), planes)
-        lost = f", without {' and '.join(lod.lost)}, which fit other faces" if lod.lost else ""
+        lost = f", without {' and '.join(lod.lost)} of its old faces" if lod.lost else ""
         return f"lod{lod.level} ({_describe(defects)}{lost})"
 
     if fine.level not in edited:
@@ -148,7 +150,7 @@ def _follow(
             if lod.level in edited:
                 um = measured(lod).distance_um
                 remarks.append(
-                    f"{describe(lod)} {um:.3g} um from lod{fine.level}, which is as it was built"
+                    f"{describe(lod)} {um:.3g} um from lod{fine.level}, which has no edits"
                 )
                 lod = measured(lod, fine.largest_um)
             result.append(lod)
@@ -159,18 +161,20 @@ def _follow(
     own = {lod.level for lod in lods[1:] if lod.level in edited and lod.shape != fine.shape}
     made = _make(tile, channel_id, lods, options, planes) if len(own) < len(lods) - 1 else {}
     result = [replace(fine, distance_um=0.0, largest_um=0.0)]
-    remade = []
+    rebuilt = []
     for lod in lods[1:]:
         if lod.level in own:
             lod = measured(lod)
-            remarks.append(f"{describe(lod)} stays, {lod.distance_um:.3g} um from lod{fine.level}")
+            remarks.append(
+                f"{describe(lod)} is kept, {lod.distance_um:.3g} um from lod{fine.level}"
+            )
         else:
             lod, defects = made[lod.level]
             found = "" if not defects else f" with {defects} faults"
-            remade.append(f"lod{lod.level}{found} within {lod.distance_um:.3g} um")
+            rebuilt.append(f"lod{lod.level}{found} within {lod.distance_um:.3g} um")
         result.append(lod)
-    if remade:
-        remarks.append(f"made anew from lod{fine.level}: {', '.join(remade)}")
+    if rebuilt:
+        remarks.append(f"rebuilt from lod{fine.level}: {', '.join(rebuilt)}")
     return result, remarks
 
 

@@ -51,7 +51,7 @@ def require_bundle(place: Path) -> None:
     is_other = place.exists() and not place.is_dir()
     if MANIFEST in sizes_of(place) or not (is_other or (others := find_others(place))):
         return
-    words = "a file" if is_other else f"{words_for(others)}, and no {MANIFEST}"
+    words = "a file" if is_other else f"{words_for(others)}, but no {MANIFEST}"
     raise OutputError(
-        f"{place}: exists and is no bundle: found {words}: {or_force('move it elsewhere')}"
+        f"{place}: found {words}, expected nothing or a bundle: {or_force('move it elsewhere')}"
     )

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from stereocell.model.errors import OutputError
 
 PAGE, FILE = "page", "file"  # kinds of blocks, for a file of the viewer and one of the bundle
-REMEDY = "copy the file again, or write it anew with `stereocell export OUT scene.html`"
+REMEDY = "copy the file again, or run `stereocell export OUT scene.html` again"
 # Fragment of a link to a view, as viewer_gltf/src/share/permalink.ts writes it
 VIEW = re.compile(r"#v=\d+(&[\w.~:;,=!*'()%+/@$?-]*)*", re.ASCII)
 _VIEW_BLOCK = re.compile(r' *<script type="text/plain" data-view>([^<]*)</script>\n')
@@ -70,7 +70,7 @@ def read_blocks(document: str) -> SceneBlocks:
         name = html.unescape(escaped)
         kept = found.page if kind == PAGE else found.files
         if name in kept:
-            raise OutputError(f"{name}: is there twice, expected one block: {REMEDY}")
+            raise OutputError(f"{name}: found two blocks, expected one: {REMEDY}")
         data = _decoded(name, text, int(size), digest)
         kept[name] = _unpacked(name, data, room) if packed else data
         room -= len(kept[name])
@@ -82,12 +82,12 @@ def _decoded(name: str, text: str, size: int, digest: str) -> bytes:
     try:
         data = base64.b64decode(text, validate=True)
     except binascii.Error:
-        raise OutputError(f"{name}: its block is no base64, so it is damaged: {REMEDY}") from None
+        raise OutputError(f"{name}: found a damaged block, expected base64: {REMEDY}") from None
     if len(data) != size:
-        raise OutputError(f"{name}: has {len(data)} bytes, expected {size}: {REMEDY}")
+        raise OutputError(f"{name}: found {len(data)} bytes, expected {size}: {REMEDY}")
     found = hashlib.sha256(data).hexdigest()
     if found != digest:
-        raise OutputError(f"{name}: has SHA-256 {found}, expected {digest}: {REMEDY}")
+        raise OutputError(f"{name}: found SHA-256 {found}, expected {digest}: {REMEDY}")
     return data
 
 
@@ -97,9 +97,10 @@ def _unpacked(name: str, data: bytes, most: int) -> bytes:
     try:
         content = unpacker.decompress(data, max(1, most))
     except zlib.error:
-        raise OutputError(f"{name}: is no gzip, expected data that unpack: {REMEDY}") from None
+        raise OutputError(f"{name}: found damaged data, expected gzip: {REMEDY}") from None
     if not unpacker.eof:
         raise OutputError(
-            f"{name}: does not unpack within {_MAX_GROWTH} times the document's size: {REMEDY}"
+            f"{name}: found cut-off data, or more than {most} bytes, expected a whole and smaller "
+            f"file: {REMEDY}"
         )
     return content

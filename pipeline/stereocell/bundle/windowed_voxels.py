@@ -37,7 +37,9 @@ def read_windowed(
     voxels = read_atlas(volume.atlas)
     if voxels.shape != volume.size[::-1]:
         found = tuple(voxels.shape[::-1])
-        raise StageError(f"{volume.atlas}: {found} voxels, the stage says {volume.size}")
+        raise StageError(
+            f"{volume.atlas}: found {found} voxels, expected {volume.size} as in the stage"
+        )
     return appearance.window_voxels(voxels)
 
 

@@ -93,7 +93,7 @@ class Composed:
         appearances = tuple(read_appearances(stage))
         prims = tile_prims(stage)
         if not prims:
-            raise StageError(f"{path}: no tile is visible")
+            raise StageError(f"{path}: found no visible tile, expected one or more: show a tile")
         boxes = [hinted_box(prim) for prim in prims]
         step_m = choose_step(float(max((high - low).max() for low, high in boxes)))
         names = tuple(str(prim.GetName()) for prim in prims)
@@ -113,7 +113,7 @@ class Composed:
         yield from notes_on_bindings(self.stage)
         yield from notes_on_edits(self.stage)
         if next(visible_lights(self.stage), None) is None:
-            yield f"{self.path}: the stage has no light of its own: the viewer keeps its lamps"
+            yield f"{self.path}: the stage has no visible light, so the viewer keeps its own lamps"
         yield from self._notes_on_parts()
 
     def _notes_on_parts(self) -> Iterator[str]:
@@ -143,7 +143,7 @@ def fill_bundle(
     changed = {path_from_stage(file, composed.path) for file in composed.as_written.changed}
     for name in sorted(changed.union(*(tile.changed for tile in tiles))):
         yield (
-            f"{composed.path.absolute().parent / name}: {CHANGED}: taken as it is; if nobody "
+            f"{composed.path.absolute().parent / name}: {CHANGED}, and is used as it is: if nobody "
             f"edited it, remove it and {REMEDY}"
         )
     files = []

@@ -33,6 +33,6 @@ def write_ar(
         return entry, ""
     path.unlink()  # the folder is not stored yet, so deleting the local file is enough
     return None, (
-        f"{entry['bytes'] / 2**20:.0f} MiB, more than the {MAX_USDZ_BYTES / 2**20:.0f} MiB "
-        "that a phone is sent"
+        f"it would have {entry['bytes'] / 2**20:.0f} MiB, above the limit of "
+        f"{MAX_USDZ_BYTES / 2**20:.0f} MiB for phones"
     )

@@ -581,7 +581,8 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
         "--max-mb",
         type=_positive,
         metavar="MB",
-        help="largest size of the page, which gets the finest levels that fit (default 25)",
+        help="largest size of the page, which gets the finest surfaces and volumes that fit "
+        "(default 25)",
     )
     pages.add_argument(
         "--view",

@@ -88,11 +88,15 @@ class Chosen:
         self.channels = self._channels()
         self.all_tiles = {str(prim.GetName()): hinted_box(prim) for prim in tile_prims(self.stage)}
         if not self.all_tiles:
-            raise StageError(f"{stage_path}: no tile is visible")
+            raise StageError(
+                f"{stage_path}: found no visible tile, expected one or more: show a tile"
+            )
         unknown = [name for name in options.tiles if name not in self.all_tiles]
         if unknown:
             known = ", ".join(self.all_tiles)
-            raise UsageError(f"--tiles: no {unknown[0]!r} is visible, expected of {known}")
+            raise UsageError(
+                f"--tiles names {unknown[0]!r}, expected visible tiles, one or more of {known}"
+            )
         self.tiles = [name for name in self.all_tiles if name in options.tiles or not options.tiles]
 
     @contextmanager
@@ -112,7 +116,7 @@ class Chosen:
         for name in wanted:
             if not any(name in (one.name, one.id) for one in found):
                 known = ", ".join(one.name for one in found)
-                raise UsageError(f"--channels: no {name!r}, expected of {known}")
+                raise UsageError(f"--channels names {name!r}, expected one or more of {known}")
         return [one for one in found if not wanted or one.name in wanted or one.id in wanted]
 
     @property
@@ -132,7 +136,7 @@ class Chosen:
         self.channels = shown
         if any(self.count_triangles()):
             names = ", ".join(one.name for one in shown)
-            self.report(f"{names} alone, as the viewer opens: --channels takes others")
+            self.report(f"only {names}, as the viewer shows at opening: --channels chooses others")
         else:
             self.channels = every
 
@@ -181,11 +185,14 @@ class Chosen:
         If there is a region, the message states the box that a region may overlap.
         """
         if self.region is None:
-            return StageError(f"{self.path}: no {kind} is left to export")
+            return StageError(
+                f"{self.path}: found no {kind} to export, expected one or more: choose other "
+                "--tiles or --channels"
+            )
         low, high = (np.array([self.all_tiles[tile][end] for tile in self.tiles]) for end in (0, 1))
         ends = zip(low.min(axis=0).tolist(), high.max(axis=0).tolist(), strict=True)
         box = ",".join(f"{a:.6g}:{b:.6g}" for a, b in ends)
-        return UsageError(f"--region: no {kind} is in it, expected a part of {box}")
+        return UsageError(f"--region: found no {kind} in it, expected a box that overlaps {box}")
 
     def count_triangles(self) -> list[int]:
         """Return the number of triangles of the selected tiles and channels at each level.
@@ -220,7 +227,10 @@ class Chosen:
         counts = self.count_triangles()
         if not any(counts):
             channels = ", ".join(channel.name for channel in self.channels)
-            raise StageError(f"{self.path}: no surface is drawn of {channels}")
+            raise StageError(
+                f"{self.path}: found no visible surface of {channels}, expected one or more: "
+                "choose other --tiles or --channels"
+            )
         most, finest = self.options.max_triangles, self.options.lod
         if most is None and finest is None and light is not None:
             return [i for i, n in enumerate(counts) if n <= light] or [len(counts) - 1]
@@ -229,8 +239,8 @@ class Chosen:
         if not levels:
             least = min(counts)
             raise UsageError(
-                f"--max-triangles is {most}: the coarsest level has {least}, expected as many, or "
-                "fewer --tiles or --channels"
+                f"--max-triangles is {most}, expected at least {least}, as the coarsest level of "
+                "detail has: raise it, or choose fewer --tiles or --channels"
             )
         return levels
 

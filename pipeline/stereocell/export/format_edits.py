@@ -81,25 +81,23 @@ _NOWHERE = (
 _NO_LIGHTS = Lack(
     "the file has no lights", {**dict.fromkeys(("light", "sphere"), ("*", WHOLE)), "lights": ("*",)}
 )
-_NO_ADDITIONS = Lack(
-    "the file has the channels' surfaces and volumes alone", {"addition": (WHOLE,)}
-)
+_NO_ADDITIONS = Lack("the file has only surfaces and volumes of channels", {"addition": (WHOLE,)})
 NO_ADDITIONS_OF_PART = Lack(
-    "a file of some tiles or of a region has the channels' surfaces alone", {"addition": (WHOLE,)}
+    "a file of some tiles or of a region has only surfaces of channels", {"addition": (WHOLE,)}
 )
 _OF_CHANNELS = (*_NOWHERE, _NO_LIGHTS, _NO_ADDITIONS)
-_NO_SPHERES = Lack("usdz is scaled, and has no lights with a place", {"sphere": ("*", WHOLE)})
+_NO_SPHERES = Lack("usdz is scaled, and has no lights with a position", {"sphere": ("*", WHOLE)})
 _NO_SHOWN = Lack("--channels chooses the channels of this file", {"shown": ("visibility",)})
 _NO_VOLUMES = Lack("the file has no volumes", _VOLUMES)
 _NO_COLORS = Lack("the file has no colours", _COLORS)
-_NO_SHADING = Lack("of a material the file has its colour alone", _SHADING)
+_NO_SHADING = Lack("the file has only the colour of a material", _SHADING)
 _NO_MATERIALS = Lack("the file has no materials", _SHADING)
 _NO_SURFACES = Lack("the file has no surfaces", {"mesh": ("*",)})
 _NO_NAMES = Lack(
     "the file has no names", {"channel": ("@displayName",), "specimen": ("@displayName",)}
 )
 _NO_FUNCTIONS = Lack(
-    "the file has voxels, and no transfer functions",
+    "the file has voxels, but no transfer functions",
     {"channel": tuple(name for name in _VOLUMES["channel"] if name != "stereocell:window")},
 )
 

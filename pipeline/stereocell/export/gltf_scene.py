@@ -46,7 +46,10 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
                 positions = mesh.positions.astype(np.float64) * scale
                 where = {"tile": piece.tile, "channel": piece.channel.name, **more}
                 if not np.isfinite(positions).all():
-                    raise StageError(f"{piece.tile}/{piece.channel.id}: a point is not finite")
+                    raise StageError(
+                        f"{piece.tile}/{piece.channel.id}: found a point that is not finite, "
+                        "expected finite positions"
+                    )
                 mesh, material = _of_one_color(mesh, piece.material)
                 document.add(
                     piece.channel.name,

@@ -72,9 +72,12 @@ def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
             channels[number] = channel.name
     if channels:
         write_meshes_info(path / "mesh", channels)
-        written.append(f"mesh: {', '.join(channels.values())}, up to {levels} levels")
+        written.append(f"mesh: {', '.join(channels.values())}, up to {levels} levels of detail")
     if not written:
-        raise StageError(f"{chosen.path}: neither a volume nor a surface is left to export")
+        raise StageError(
+            f"{chosen.path}: found no volume and no surface to export, expected one or more: "
+            "choose other --tiles or --channels"
+        )
     return "; ".join(written)
 
 

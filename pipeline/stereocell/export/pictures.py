@@ -74,7 +74,7 @@ def _encode(chosen: Chosen, path: Path, shapes: list[Shape], ffmpeg: str) -> tup
         printed = encoder.stderr.read().decode(errors="replace").strip()
     if encoder.returncode:
         last = printed.splitlines()[-1] if printed else f"exit code {encoder.returncode}"
-        raise OutputError(f"{path}: ffmpeg: {last}")
+        raise OutputError(f"{path}: ffmpeg failed: {last}")
     return size
 
 

@@ -121,7 +121,7 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
     size += describe_size(high - low)
     line = f"{counted(len(bodies), 'body', 'bodies')}, {count:,} triangles at lod{level}, {size}"
     if len(thin) > _MAX_REPORTED:
-        thin[_MAX_REPORTED:] = [f"... and of {len(thin) - _MAX_REPORTED} more parts"]
+        thin[_MAX_REPORTED:] = [f"... and {len(thin) - _MAX_REPORTED} more parts with thin bodies"]
     return "\n".join([line, *thin])
 
 
@@ -161,8 +161,8 @@ def _close(surface: _Surface, name: str, is_capped: bool) -> manifold3d.Manifold
     positions, triangles = weld(surface.meshes)
     if not is_capped and len(border(triangles)):
         raise StageError(
-            f"{name}: its surface is open at the block's faces, as --no-caps built it, and no "
-            "solid: build with --caps, or export .glb or .usdz, which may be open"
+            f"{name}: found a surface that is open at the block's faces (--no-caps), expected a "
+            "closed one: build with --caps, or export .glb or .usdz"
         )
     back = np.linalg.inv(np.array(surface.moved).reshape(4, 4))
     own = positions.astype(np.float64) @ back[:3, :3] + back[3, :3]

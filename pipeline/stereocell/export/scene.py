@@ -66,9 +66,9 @@ def _finest_that_fits(
     document = render(levels)
     if len(document) > most:
         raise UsageError(
-            f"--max-mb is {most / MB_BYTES:g}: the page with the coarsest surfaces and volumes "
-            f"takes {ceil(len(document) / MB_BYTES * 100) / 100:.2f} MB, expected as much, or "
-            "fewer --channels"
+            f"--max-mb is {most / MB_BYTES:g}, expected at least "
+            f"{ceil(len(document) / MB_BYTES * 100) / 100:.2f}, as the page with the coarsest "
+            "surfaces and volumes needs: raise it, or choose fewer --channels"
         )
     growing = [kind for kind in ("surfaces", "volumes") if getattr(levels, kind) > 0]
     while growing:
@@ -89,20 +89,20 @@ def _about(files: SceneFiles, levels: Levels, size: int) -> str:
     holds, out = [], []
     if files.surface_levels:
         holds.append(f"surfaces at lod{levels.surfaces}")
-        out += _finer(levels.surfaces, "surfaces")
+        out += _finer(levels.surfaces, "level", "of detail")
     if files.volume_levels:
         voxels = " x ".join(map(str, files.largest_volume(levels)))
-        holds.append(f"volumes at mip level {levels.volumes} (up to {voxels} voxels a tile)")
-        out += _finer(levels.volumes, "volumes")
+        holds.append(f"volumes at resolution level {levels.volumes} (up to {voxels} voxels a tile)")
+        out += _finer(levels.volumes, "resolution level", "of volumes")
     if files.has_usdz:
         out.append("specimen.usdz")
     left = f"left out: {', '.join(out)}" if out else "nothing left out"
     return f"{size / MB_BYTES:.2f} MB with {' and '.join(holds) or 'no surface'}; {left}"
 
 
-def _finer(count: int, of: str) -> list[str]:
+def _finer(count: int, kind: str, of: str) -> list[str]:
     """Return a list with words for left-out levels; empty if there are none."""
-    return [f"{count} finer level{'s' if count > 1 else ''} of {of}"] if count else []
+    return [f"{count} finer {kind}{'s' if count > 1 else ''} {of}"] if count else []
 
 
 def _view_of(link: str) -> str:
@@ -112,6 +112,6 @@ def _view_of(link: str) -> str:
     view = link[link.find("#") :]
     if len(view) > _LONGEST_VIEW or not VIEW.fullmatch(view):
         raise UsageError(
-            f"--view is {link[:80]!r}, expected a link that the viewer has made, with #v=1 in it"
+            f"--view is {link[:80]!r}, expected a link from the viewer, with #v=1 in it"
         )
     return view

@@ -22,7 +22,7 @@ from stereocell.storage.file_list import encode, is_same, read_list, to_json
 from stereocell.storage.json_files import compact_json, read_json, sealed
 
 _PACKS = {".json", ".glb", ".bin", ".hdr"}  # suffixes that gzip makes smaller
-_NO_USDZ = "left out of a scene in one file"
+_NO_USDZ = "a scene in one file has none"
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class SceneFiles:
         for name in wanted:
             if not any(name in (one["name"], one["id"]) for one in found):
                 known = ", ".join(one["name"] for one in found)
-                raise UsageError(f"--channels: no {name!r}, expected of {known}")
+                raise UsageError(f"--channels names {name!r}, expected one or more of {known}")
         return [one for one in found if not wanted or {one["name"], one["id"]} & set(wanted)]
 
     @property
@@ -222,12 +222,10 @@ class SceneFiles:
         file = self._root / path
         if path not in self._listed or not file.is_file():
             raise OutputError(
-                f"{file}: missing from the bundle, expected as {FILES} lists: {REMEDY}"
+                f"{file}: missing from the bundle, expected the file in {FILES}: {REMEDY}"
             )
         if not is_same(file, self._listed[path]):
-            raise OutputError(
-                f"{file}: not as {FILES} has it, expected the file of the bundle: {REMEDY}"
-            )
+            raise OutputError(f"{file}: its size or hash differs from {FILES}: {REMEDY}")
         self._trusted.add(path)
 
 

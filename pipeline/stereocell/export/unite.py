@@ -55,11 +55,14 @@ def to_solid(
         return solid
     edges = border(triangles)
     if not len(edges):
-        raise StageError(f"{name}: can't be made one solid: {solid.status().name}")
+        raise StageError(
+            f"{name}: found a surface with the fault {solid.status().name}, expected one that "
+            "encloses a solid: repair it"
+        )
     x, y, z = positions[edges[0, 0]].tolist()
     raise StageError(
-        f"{name}: its surface is open at {len(edges)} edges, one at ({x:.4g}, {y:.4g}, {z:.4g}) um:"
-        " an edit opened it, expected a closed surface"
+        f"{name}: found {len(edges)} open edges, one at ({x:.4g}, {y:.4g}, {z:.4g}) um, expected a "
+        "closed surface: close it in the program that edited it"
     )
 
 

@@ -60,7 +60,8 @@ def write_nifti(chosen: Chosen, path: Path, _: int) -> str:
     grid = layout.grid
     if max(grid.size) > _NIFTI_MOST:
         raise UsageError(
-            f"{max(grid.size)} voxels along an axis are more than NIfTI has: use .nrrd"
+            f"{path.name}: found {max(grid.size)} voxels along an axis, expected at most "
+            f"{_NIFTI_MOST}: use .nrrd"
         )
     scratch = path.with_name("voxels")
     scratch.touch()
@@ -87,7 +88,7 @@ def _layout(chosen: Chosen) -> Layout:
     layout = find_layout(chosen)
     if chosen.options.unity and max(layout.grid.size) > _UNITY_MOST:
         raise UsageError(
-            f"--unity: {max(layout.grid.size)} voxels along an axis are more than Unity's "
-            f"{_UNITY_MOST}, expected a --region"
+            f"--unity: found {max(layout.grid.size)} voxels along an axis, expected at most "
+            f"{_UNITY_MOST}: choose a --region"
         )
     return layout

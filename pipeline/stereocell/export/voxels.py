@@ -95,11 +95,15 @@ def find_layout(chosen: Chosen) -> Layout:
         if start is None:
             start, steps = place, own
         if not np.allclose(own, steps, rtol=1e-5, atol=1e-5 * np.abs(steps).max()):
-            raise StageError(f"{tile}: an edit turned or scaled it, expected all tiles alike")
+            raise StageError(
+                f"{tile}: found an edit that turned or scaled only this tile, expected the same "
+                "for all tiles: choose other --tiles"
+            )
         at = (place - start) @ np.linalg.inv(steps)
         if np.abs(at - np.rint(at)).max() > _OFF:
             raise StageError(
-                f"{tile}: an edit moved it by a part of a voxel, expected tiles on one lattice"
+                f"{tile}: found a move by a part of a voxel, expected whole voxels: choose other "
+                "--tiles"
             )
         firsts[tile] = np.rint(at).astype(np.int64)
         ends.append(firsts[tile] + np.array(volume.size) - 2 * volume.apron)
@@ -109,12 +113,18 @@ def find_layout(chosen: Chosen) -> Layout:
     if start is None:
         names = ", ".join(channel.name for channel in chosen.channels)
         are_maps = len(chosen.label_maps) == len(chosen.channels)
-        why = ": of a label map the stage has surfaces alone" if are_maps else ""
-        raise StageError(f"{chosen.path}: no volume of {names}{why}")
+        why = " (label maps have only surfaces)" if are_maps else ""
+        raise StageError(
+            f"{chosen.path}: found no volume of {names}{why}, expected one or more: choose other "
+            "--channels"
+        )
     channels = tuple(channel for channel in chosen.channels if channel.id in found)
     if options.unity and len(channels) > 1:
         names = ", ".join(channel.name for channel in channels)
-        raise UsageError(f"--unity takes one channel, expected --channels with one of {names}")
+        raise UsageError(
+            f"--unity: found {len(channels)} channels, expected one: name one of {names} by "
+            "--channels"
+        )
     first, end = np.min(list(firsts.values()), axis=0), np.max(ends, axis=0)
     within = _cut(chosen.region, start, steps, first, end)
     if within is None:
@@ -179,8 +189,8 @@ class _Span:
             self.is_known = False
             if is_needed:
                 raise UsageError(
-                    f"--bits 16: the stage has no more than 8 of {channel.name}: it was built with "
-                    "--bits 8"
+                    f"--bits is 16, expected 8, because the stage has 8 bits of {channel.name}: "
+                    "build without --bits 8"
                 )
             return
         self._low = min(self._low, float(values.min()))

@@ -135,7 +135,8 @@ def export(
         raise no_layer(path, is_given=stage is not None)
     if out_folder.is_stored and path.is_relative_to(out) and FORMATS[find_ending(file)].names_files:
         raise OutputError(
-            f"{file.name}: it names files of OUT by their paths, expected OUT in a folder, or .usdz"
+            f"{file.name}: refers to files of OUT by path, expected OUT in a folder, not in "
+            "object storage: export .usdz"
         )
     files = dependencies(path, out_folder.stage_dir)  # fails for files outside of these folders
     _require_outside(file, out_folder, files)
@@ -170,7 +171,10 @@ def _export(
     """
     ending = find_ending(file)
     if ending == PAGE:
-        raise UsageError(f"{file}: a page is made of a bundle, expected `stereocell export OUT`")
+        raise UsageError(
+            f"{file}: found a layer as the source of a page, expected OUT with its bundle: run "
+            "`stereocell export OUT`"
+        )
     way = FORMATS[ending]
     _require_takes(ending, way.takes, options)
     for place in (file, *way.beside(file, options)):  # before the work
@@ -187,7 +191,7 @@ def _export(
         line = _write_smallest(chosen, way, beside / file.name)
         places = _put_all_in_place(file, beside, is_ours)
     for layer in sorted(chosen.as_written.changed):
-        report(f"{layer}: {CHANGED}: taken as it is")
+        report(f"{layer}: {CHANGED}, and is used as it is")
     return line, places
 
 
@@ -221,8 +225,8 @@ def _export_page(
     """Write a page of OUT's bundle; return a sentence about it, and its path."""
     if is_staged:
         raise UsageError(
-            f"--stage can't be for {PAGE}, which holds the bundle: run `stereocell bundle OUT "
-            "--stage edited.usda` first, and export without it"
+            f"--stage does not apply to {PAGE}, which holds the bundle: run `stereocell bundle OUT "
+            "--stage edited.usda` first, then export without --stage"
         )
     _require_takes(PAGE, PAGE_TAKES, options)
     require_documents(out_folder, "publish")
@@ -253,10 +257,10 @@ def _write_smallest(chosen: Chosen, way: Format, file: Path) -> str:
         size = file.stat().st_size
         if most is None or size <= most:
             return line
-        chosen.report(f"lod{level} takes {size} bytes, more than {most}")
+        chosen.report(f"lod{level} takes {size} bytes, more than --max-bytes {most}")
     raise UsageError(
-        f"--max-bytes is {most}: the smallest file has {size}, expected as many, or fewer --tiles "
-        "or --channels"
+        f"--max-bytes is {most}, expected at least {size}, as the smallest file has: raise it, or "
+        "choose fewer --tiles or --channels"
     )
 
 
@@ -287,7 +291,9 @@ def _require_outside(file: Path, out_folder: OutFolder, files: Sequence[Path]) -
     if place in {one.resolve() for one in files} or any(
         place.is_relative_to(folder.resolve()) for folder in made
     ):
-        raise UsageError(f"{file}: a part of the build lies there, expected another place")
+        raise UsageError(
+            f"{file}: found a part of the build, expected another place: choose one outside of it"
+        )
 
 
 def find_ending(file: Path) -> str:
@@ -296,14 +302,19 @@ def find_ending(file: Path) -> str:
     for ending in ENDINGS:
         if name.endswith(ending) and len(name) > len(ending):
             return ending
-    raise UsageError(f"{file}: expected a name that ends in {', '.join(ENDINGS)}")
+    raise UsageError(
+        f"{file}: found the ending {file.suffix!r}, expected a name that ends in one of "
+        f"{', '.join(ENDINGS)}"
+    )
 
 
 def _make_folder_of(file: Path) -> None:
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{file.parent}: can't be made: {error.strerror or error}") from error
+        raise OutputError(
+            f"{file.parent}: can't be made ({error.strerror or error}): choose another folder"
+        ) from error
 
 
 def _require_takes(ending: str, takes: frozenset[str], options: ExportOptions) -> None:
@@ -311,4 +322,7 @@ def _require_takes(ending: str, takes: frozenset[str], options: ExportOptions) -
     for name in sorted(options.given() - takes - {"channels"}):
         able = [other for other, taken in every.items() if name in taken]
         flag = name.replace("_", "-")
-        raise UsageError(f"--{flag} can't be for {ending}, expected one of {', '.join(able)}")
+        raise UsageError(
+            f"--{flag} does not apply to {ending}, expected a file that ends in one of "
+            f"{', '.join(able)}"
+        )

@@ -146,7 +146,7 @@ class ChannelLevels:
         if self.clear:
             return ""
         if not self.all_levels:
-            return "nothing stands out: no level has more than a few voxels above it"
+            return "nothing stands out: no iso-value has more than a few voxels above it"
         if self._why_no_surface:
             return self._why_no_surface
         return max(self.all_levels, key=lambda level: level.confidence).why_unclear

@@ -116,9 +116,9 @@ class Level:
         if self.steepness >= MIN_STEEPNESS:
             return ""
         return (
-            f"no level separates two groups of voxels better than in noise: at {self.value:.5g} "
-            f"{self.separation:.0%} of the variance lies between them, expected at least "
-            f"{MIN_SEPARATION:.0%}"
+            "no iso-value separates two groups of voxels better than in noise: at "
+            f"{self.value:.5g} {self.separation:.0%} of the variance lies between them, expected "
+            f"at least {MIN_SEPARATION:.0%}"
         )
 
     @property

@@ -85,8 +85,10 @@ class IsoValueOptions:
     )
     scope: str = setting(
         "channel",
-        "channel: one level for all tiles; tile: a level for each tile, near the channel's",
-        flag=Flag("--iso-scope", "channel (default): one level for all tiles; tile: one for each"),
+        "channel: one iso-value for all tiles; tile: one for each tile, near the channel's",
+        flag=Flag(
+            "--iso-scope", "channel (default): one iso-value for all tiles; tile: one for each"
+        ),
     )
     level: str = setting(
         "outer",
@@ -95,11 +97,13 @@ class IsoValueOptions:
         f"cells touch); {CONNECTED}: the lowest at which vessels are connected and nothing else "
         f"is inside; {NO_SURFACE}: no level",
     )
-    bins: int = setting(256, "levels that a criterion of edges compares", bounds=Bounds(16, 65536))
+    bins: int = setting(
+        256, "iso-values that a criterion of edges compares", bounds=Bounds(16, 65536)
+    )
     clip_percentile: float = setting(
         99.99,
-        "percentile of the voxels up to which a criterion of edges looks for levels; hot pixels "
-        "are brighter",
+        "percentile of the voxels up to which a criterion of edges looks for iso-values; hot "
+        "pixels are brighter",
         bounds=Bounds(0, 100),
     )
     min_area_share: float = setting(
@@ -167,8 +171,9 @@ class SurfaceOptions:
     )
     max_thin: float = setting(
         0.05,
-        "largest share of a channel's voxels above its level that may lie in structures too thin "
-        "for planes grid_um apart; with more of them all planes carry the surface; 1: no limit",
+        "largest share of a channel's voxels above its iso-value that may lie in structures too "
+        "thin for planes grid_um apart; with more of them all planes carry the surface; 1: no "
+        "limit",
         bounds=Bounds(0, 1),
     )
     max_faces: int = setting(

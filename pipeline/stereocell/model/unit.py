@@ -95,8 +95,8 @@ class Cover:
     def words(self) -> str:
         """The shares as text for a reader."""
         return (
-            f"the solid covers {1 - self.missing:.1%} of the source's voxels above the level, and "
-            f"{self.added:.1%} of the solid lies below it"
+            f"the solid covers {1 - self.missing:.1%} of the source's voxels above the iso-value, "
+            f"and {self.added:.1%} of the solid lies below it"
         )
 
 

@@ -185,13 +185,13 @@ def _remarks(
         remark = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
         yield remark + _loss(plan, surveyed, chosen.components)
     if found.subtracts and found.background is None:
-        yield "found no background to subtract: its level counts from 0"
+        yield "found no background to subtract: its iso-value counts from 0"
     if thinning := surveyed.thinning(plan):
         yield thinning
     if surveyed.appearance.surface_reason:
         yield surveyed.appearance.surface_reason
     if surveyed.appearance.surface == "unsure" and (near := surveyed.near_levels):
-        yield f"near levels: {near}"
+        yield f"near iso-values: {near}"
 
 
 def _loss(plan: Plan, surveyed: ChannelSurvey, components: Components) -> str:

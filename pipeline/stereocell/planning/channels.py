@@ -196,8 +196,8 @@ def require_no_background(settings: Settings, channels: Sequence[Channel], modal
     for flag, value in given:
         if parse_level(flag, value)[1]:
             raise UsageError(
-                f"{flag}={value}: found a level above the background, which is never subtracted "
-                f"from {modality}, expected a voxel value"
+                f"{flag}={value}: found an iso-value above the background, which is never "
+                f"subtracted from {modality}, expected a voxel value"
             )
 
 

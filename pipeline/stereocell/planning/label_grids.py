@@ -78,7 +78,7 @@ def settle_spacing(image: Dataset, labels: Dataset) -> tuple[str, ...]:
 
 def note_on_assumed(image: Dataset, level: int) -> str:
     """Return the note on labels without a voxel size, which take that of a level of equal shape."""
-    reason = f"as level {level} of the image has as many voxels"
+    reason = f"as resolution level {level} of the image has as many voxels"
     assumed = Statement(image.levels[level].spacing_um, reason, Trust.ASSUMED)
     return settle(_SPACING, [assumed]).notes[0]
 

@@ -144,7 +144,9 @@ def find_level(
     elif clear:
         place = LEVEL_NAMES[wanted]
         if place >= len(clear):
-            reason = f"no clear surface: found {len(clear)} clear levels, none of them the {wanted}"
+            reason = (
+                f"no clear surface: found {len(clear)} clear iso-values, none of them the {wanted}"
+            )
         clear = clear[place : place + 1]
     return Found(window, levels, evidence, clear, levels.subtracts, reason)
 
@@ -172,18 +174,18 @@ def explain_uncertainty(found: Found, chosen: int, tiles: Sequence[TileIso]) -> 
     clear, highest = found.levels.clear, highest_of(found.window.statistics, found.subtracts)
     if level in found.levels.all_levels and level not in clear and clear:
         return (
-            f"the level is nearly clear ({level.why_unclear}), but the next clear level, "
+            f"the iso-value is nearly clear ({level.why_unclear}), but the next clear one, "
             f"{clear[0].value:.5g}, leaves only {clear[0].share:.3%} of the voxels inside"
         )
     if level.value > highest:
-        return f"the level lies above the display window, which ends at {highest:.5g}"
+        return f"the iso-value lies above the display window, which ends at {highest:.5g}"
     if all(tile.confidence is None for tile in tiles):
-        return "no tile by itself has enough voxels on both sides of the level"
+        return "no tile by itself has enough voxels on both sides of the iso-value"
     if uneven := _uneven_light(found, level):
         return uneven
     if bodies := bodies_in_haze(level, found.levels.all_levels):
         return (
-            "the surface may enclose a haze around brighter structures: their level, "
+            "the surface may enclose a haze around brighter structures: their iso-value, "
             f"{bodies.value:.5g}, has {bodies.contrast / level.contrast:.0f} times the contrast "
             f"and {bodies.share:.2%} of the voxels inside"
         )
@@ -302,7 +304,7 @@ def check_histogram(found: Found) -> Found:
 def _without_surface(found: Found, side: str) -> Found:
     above = " above the background" if found.subtracts else ""
     level = _value_of(found.candidates[0])
-    reason = f"no surface: all voxels lie {side} the level {level:.5g}{above}"
+    reason = f"no surface: all voxels lie {side} the iso-value {level:.5g}{above}"
     return replace(found, candidates=(), reason=reason)
 
 

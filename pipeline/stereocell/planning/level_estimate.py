@@ -68,7 +68,7 @@ def notes_on_levels(plan: Plan) -> list[str]:
     others = len(own) - len(lines)
     if others:
         rest = f"{counted(others, 'other channel')}" if lines else "the channels"
-        lines.append(f"the plan does not estimate the levels of {rest}: the build finds them")
+        lines.append(f"the plan does not estimate the iso-values of {rest}: the build finds them")
     return lines
 
 

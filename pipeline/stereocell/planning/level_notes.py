@@ -23,11 +23,12 @@ def note_before_reading(plan: Plan, channel: Channel) -> str:
     given = given_level(plan, channel)
     if given is not None:
         value, is_above = given
-        return f"level {value:.5g}{MARK + ABOVE_BACKGROUND if is_above else ''}, from the settings"
+        mark_given = MARK + ABOVE_BACKGROUND if is_above else ""
+        return f"iso-value {value:.5g}{mark_given}, from the settings"
     if wanted == NO_SURFACE:
         base = channel.base or channel.name
         return f"no surface is built by default (--surfaces {base}=outer builds one)"
-    return f"the build finds the {wanted} level" if channel.level else ""
+    return f"the build finds the {wanted} iso-value" if channel.level else ""
 
 
 def note_on_found(plan: Plan, found: Found, *, is_whole: bool) -> str:
@@ -44,7 +45,7 @@ def note_on_found(plan: Plan, found: Found, *, is_whole: bool) -> str:
         kind = "the adaptive threshold"
         if found.window.counting.mask is not None:
             kind = "half-way between the two values of a mask"
-        return f"level {about}{value:.{digits}g}, {kind}"
+        return f"iso-value {about}{value:.{digits}g}, {kind}"
     if len(levels) > 1:
         choice = _CHOICES[plan.settings.isovalue.level]
         return f"the build takes one of {about}{words_of(levels, mark, digits)}: {choice}{tail}"
@@ -56,9 +57,9 @@ def note_on_found(plan: Plan, found: Found, *, is_whole: bool) -> str:
     else:
         unsure = _explain_uncertainty(plan, found, is_whole)
         near = find_near_levels(all_levels, levels[0].value, is_unsure=bool(unsure))
-        text = f"level {about}{words_of(levels, mark, digits)}"
+        text = f"iso-value {about}{words_of(levels, mark, digits)}"
         text = f"unsure {text}: {unsure}" if unsure else f"clear {text}"
-    beside = f"; near levels: {words_of(near, mark, digits)}" if near else ""
+    beside = f"; near iso-values: {words_of(near, mark, digits)}" if near else ""
     return f"{text}{beside}{tail}"
 
 

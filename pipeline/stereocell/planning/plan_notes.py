@@ -70,14 +70,15 @@ def _absent(
     nouns = f"{absent.noun}s"
     if absent.count == absent.total:
         raise SourceError(
-            f"{dataset.shown}: level {level}: found none of {absent.total} {nouns}, expected the "
-            f"{nouns} that hold voxels: copy the volume again, or choose another --level"
+            f"{dataset.shown}: resolution level {level}: found none of {absent.total} {nouns}, "
+            f"expected the {nouns} that hold voxels: copy the volume again, or choose another "
+            "--level"
         )
     share = max(absent.count / absent.total, 1e-4)
     return [
-        f"{absent.count} of {absent.total} {nouns} of level {level} ({share:.2%}) are not stored: "
-        f"they are read as {absent.fill}, and the format does not state whether they are empty or "
-        "missing"
+        f"{absent.count} of {absent.total} {nouns} of resolution level {level} ({share:.2%}) are "
+        f"not stored: they are read as {absent.fill}, and the format does not state whether they "
+        "are empty or missing"
     ]
 
 
@@ -85,8 +86,8 @@ def summary_of(plan: Plan) -> str:
     """Return one line on a plan: its level, voxels, tiles and channels."""
     shape = " x ".join(str(n) for n in plan.region.shape)
     return (
-        f"{plan.name}, level {plan.level} ({plan.level_reason}); {shape} voxels (z, y, x) of "
-        f"{words_of_spacing(plan.spacing_um)}, "
+        f"{plan.name}, resolution level {plan.level} ({plan.level_reason}); {shape} voxels "
+        f"(z, y, x) of {words_of_spacing(plan.spacing_um)}, "
         f"{counted(len(plan.tiles), 'tile')} x {counted(len(plan.channels), 'channel')}"
         + "".join(f", objects of {one.name}" for one in plan.labels)
     )
@@ -115,16 +116,19 @@ def ignored_notes(settings: Settings, channels: Sequence[Channel]) -> Iterator[s
         keys = (channel.name, str(channel.index), ALL)
         given = next((settings.iso_values[k] for k in keys if k in settings.iso_values), None)
         if channel.level and given is not None and given != settings.iso_values.get(ALL):
-            yield f"{channel.name}: --surfaces chooses the level, so iso-value {given} is ignored"
+            yield f"{channel.name}: --surfaces chooses the iso-value, so {given} is ignored"
         if channel.level and options.criterion != LEVELS:
-            yield f"{channel.name}: --surfaces chooses the level, so {options.criterion} is ignored"
+            yield (
+                f"{channel.name}: --surfaces chooses the iso-value, so --iso-criterion "
+                f"{options.criterion} is ignored"
+            )
         is_number = (
             channel.level not in (*LEVEL_NAMES, NO_SURFACE) if channel.level else given is not None
         )
         if is_number and options.scope == "tile":
             yield (
-                f"{channel.name}: the settings state its level, so all tiles have the same one, "
-                "and --iso-scope tile is ignored"
+                f"{channel.name}: the settings state its iso-value, so all tiles have the same "
+                "one, and --iso-scope tile is ignored"
             )
 
 

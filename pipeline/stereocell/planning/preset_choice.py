@@ -108,11 +108,12 @@ def _explain_mismatch(dataset: Dataset, preset: str) -> str:
         return ""
     flags, level = evidence.flags, LEVELS_HU[preset]
     if preset == "ct-bone":
-        flags = evidence.bone_flags or "--iso-value 0=VALUE sets a level as a voxel value"
-    mismatch = f"{evidence.words}, and its level of {level:g} is meant for Hounsfield units"
+        flags = evidence.bone_flags or "--iso-value 0=VALUE sets an iso-value"
+    mismatch = f"{evidence.words}, and its iso-value of {level:g} is meant for Hounsfield units"
     if is_other_scale(dataset, level):
         return (
-            f"{mismatch}: its level and window are ignored, and the build finds others (or {flags})"
+            f"{mismatch}: its iso-value and window are ignored, and the build finds others (or "
+            f"{flags})"
         )
     return f"{mismatch} ({flags})"
 
@@ -189,7 +190,7 @@ def _advice(evidence: CtEvidence) -> str:
         return f"{evidence.words} are typical of a CT: for a CT {evidence.flags}"
     if evidence.basis == NO_SCALE:
         return f"for a CT {evidence.flags}"
-    return f"for a CT {evidence.flags}; its level lies {evidence.basis}"
+    return f"for a CT {evidence.flags}; its iso-value lies {evidence.basis}"
 
 
 def _describe(chosen: str | None, reason: str) -> tuple[str, ...]:

@@ -89,11 +89,12 @@ class PlanOptions:
     )
     region: str = setting(
         "",
-        "part to build, such as z0:z1,y0:y1,x0:x1 in voxels of the level that is built; empty: all",
+        "part to build, such as z0:z1,y0:y1,x0:x1 in voxels of the resolution level that is "
+        "built; empty: all",
         flag=Flag(
             "--region",
-            "part to build, such as z0:z1,y0:y1,x0:x1 in voxels of the level that is built "
-            "(without --level the finest one whose region has at most plan.max_voxels)",
+            "part to build, such as z0:z1,y0:y1,x0:x1 in voxels of the resolution level that is "
+            "built (without --level the finest one whose region has at most plan.max_voxels)",
         ),
     )
     tile_size: tuple[int, ...] = setting(

@@ -99,8 +99,8 @@ class ChannelSurvey:
         z, y, x = plan.with_grid(self.grid_um).step
         if (z, y, x) == (1, 1, 1):
             return (
-                f"{self.thin_share:.0%} of its voxels above the level lie in structures too thin "
-                f"for planes {surface.grid_um:g} um apart (surface.grid_um), more than "
+                f"{self.thin_share:.0%} of its voxels above the iso-value lie in structures too "
+                f"thin for planes {surface.grid_um:g} um apart (surface.grid_um), more than "
                 f"{surface.max_thin:.0%} (surface.max_thin): all planes carry its surface"
             )
         return (

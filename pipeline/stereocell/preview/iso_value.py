@@ -203,7 +203,7 @@ def _spread(plan: Plan, tile: Tile) -> list[Tile]:
 
 def table(result: Preview) -> list[str]:
     """Return the candidates as lines of text; a star marks the one that a build uses."""
-    head = f"{'candidate':<18}{'level':>12}{'raw':>12}{'inside':>10}{'confidence':>12}"
+    head = f"{'candidate':<18}{'iso-value':>12}{'raw':>12}{'inside':>10}{'confidence':>12}"
     lines = [f"{head}  choose it by"]
     for c in result.candidates:
         confidence = "-" if c.confidence is None else f"{c.confidence:.2f}"

@@ -27,7 +27,7 @@ def find_remarks(facts: Facts) -> list[Remark]:
     looks = {channel.name: facts.survey[channel.id].appearance for channel in facts.plan.channels}
     with_surface = {u.channel.name for u in units if not u.reason}
     whole = [
-        f"{name}: {look.surface_reason or 'no voxel lies above its level'}"
+        f"{name}: {look.surface_reason or 'no voxel lies above its iso-value'}"
         for name, look in looks.items()
         if name not in with_surface
     ]

@@ -42,7 +42,7 @@ class WriteStage(Keyed):
     The fields are those of `usd.write_stage`.
     """
 
-    VERSION: ClassVar[int] = 5
+    VERSION: ClassVar[int] = 6
 
     name: str
     tiles: tuple[WriteStageTile, ...]

@@ -18,7 +18,10 @@ def require_composed(stage: Usd.Stage) -> None:
     """Raise StageError for the first layer, payload or reference that USD failed to compose."""
     errors = stage.GetCompositionErrors()
     if errors:
-        raise StageError(f"{stage.GetRootLayer().realPath}: {one_line(errors[0])}")
+        raise StageError(
+            f"{stage.GetRootLayer().realPath}: can't be composed, expected layers that USD can "
+            f"open: {one_line(errors[0])}"
+        )
 
 
 def drawn(tile: Usd.Prim, path: object) -> Usd.Prim | None:
@@ -65,18 +68,23 @@ def to_world(prim: Usd.Prim) -> NDArray[np.float64]:
     try:
         matrix = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))
     except Tf.ErrorException as error:
-        raise StageError(f"{prim.GetPath()}: {one_line(error)}") from error
+        raise StageError(
+            f"{prim.GetPath()}: USD can't compute its transform, expected valid xformOps: "
+            f"{one_line(error)}"
+        ) from error
     finally:
         del quiet
     is_near = np.abs(matrix).max() <= FARTHEST_UM
     if not is_near or not np.abs(np.linalg.det(matrix[:3, :3])) > 0:
         raise StageError(
-            f"{prim.GetPath()}: its transform is flat, infinite or leads farther than "
-            f"{FARTHEST_UM:g} um, expected one that a surface survives"
+            f"{prim.GetPath()}: its transform is flat, infinite or moves farther than "
+            f"{FARTHEST_UM:g} um, expected finite moves and scales other than 0: correct its "
+            "xformOps"
         )
     if not np.allclose(matrix[:, 3], (0, 0, 0, 1), rtol=0, atol=_PERSPECTIVE):
         raise StageError(
-            f"{prim.GetPath()}: its transform has a perspective, expected the last column of its "
-            f"matrix to be 0, 0, 0, 1, found {', '.join(f'{part:g}' for part in matrix[:, 3])}"
+            f"{prim.GetPath()}: the last column of its transform is "
+            f"{', '.join(f'{part:g}' for part in matrix[:, 3])}, expected 0, 0, 0, 1: remove the "
+            "perspective from its xformOps"
         )
     return matrix

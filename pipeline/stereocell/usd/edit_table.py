@@ -175,31 +175,31 @@ REASONS: tuple[tuple[str, str], ...] = (
     ("subdivision*", "surfaces are not subdivided here: apply the subdivision and export points"),
     ("crease*", "surfaces are not subdivided here: apply the subdivision and export points"),
     ("corner*", "surfaces are not subdivided here: apply the subdivision and export points"),
-    ("outputs:*", "the viewer draws with its own shaders, and takes a UsdPreviewSurface alone"),
+    ("outputs:*", "the viewer draws with its own shaders, and reads only UsdPreviewSurface"),
     (
         "primvars:displayOpacity*",
-        "one value for the whole mesh is taken over, and this has several",
+        "the bundle takes over one value for the whole mesh, and this primvar has several",
     ),
     ("primvars:displayColor*", "another value feeds the colour of the mesh's material"),
     ("primvars:*", "no material of the mesh reads this primvar"),
-    (DISPLAY_SCALE, "display.usda and the Blender add-on use it; the viewer has a size of its own"),
-    ("xformOp*", "nothing in the bundle stands at this prim"),
-    ("purpose", "nothing in the bundle is drawn by this prim"),
-    ("visibility", "nothing in the bundle is drawn by this prim"),
-    ("userProperties:*", "properties of the program that wrote the layer stay there"),
-    ("collection:*", "no material is bound to this collection; lamps light all that is there"),
-    ("@customData", "custom data stay with the stage"),
-    ("@assetInfo", "asset information stays with the stage"),
-    ("@kind", "the kinds of prims stay with the stage"),
+    (DISPLAY_SCALE, "only display.usda and the Blender add-on use it; the viewer has its own size"),
+    ("xformOp*", "this prim places nothing in the bundle"),
+    ("purpose", "this prim draws nothing in the bundle"),
+    ("visibility", "this prim draws nothing in the bundle"),
+    ("userProperties:*", "properties of other programs stay in the stage"),
+    ("collection:*", "no material is bound to this collection, and lamps light everything"),
+    ("@customData", "custom data stay in the stage"),
+    ("@assetInfo", "asset information stays in the stage"),
+    ("@kind", "the kinds of prims stay in the stage"),
     ("@displayName", "the bundle has no name for this prim"),
 )
 
 # Reasons why an added prim is lost; the key is its type, or the end of it, as in SphereLight
 ADDED: dict[str, str] = {
-    "Light": "the viewer's lamps are distant lights, spheres and domes",
-    "Volume": "it is no volume of a channel in a tile",
+    "Light": "the viewer has only distant, sphere and dome lights",
+    "Volume": "it is not the volume of a channel in a tile",
     "Material": "no mesh is bound to it",
-    "Shader": "no surface is drawn with it",
+    "Shader": "no surface uses it",
 }
 
 

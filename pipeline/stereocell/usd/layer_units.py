@@ -38,8 +38,8 @@ def require_units(stage: Usd.Stage) -> None:
         expected_prim = top if layer == stage.GetRootLayer() else ""
         for field, found, expected, effect in _wrong_fields(layer, expected_prim):
             raise StageError(
-                f"{layer.realPath}: {field} is {found}, expected {expected}: write {lines[field]} "
-                f"there; {effect}"
+                f"{layer.realPath}: {field} is {found}, expected {expected}: write {lines[field]}, "
+                f"because {effect}"
             )
 
 
@@ -52,9 +52,8 @@ def require_no_display(stage: Usd.Stage) -> None:
         path = Path(layer.realPath)
         if path.name == DISPLAY_NAME and path.with_name(STAGE_NAME).is_file():
             raise StageError(
-                f"{stage.GetRootLayer().realPath}: lies over {path.name}, which shows the stage "
-                f"enlarged and in metres, expected {STAGE_NAME}: put the edits into a layer over "
-                "that one"
+                f"{stage.GetRootLayer().realPath}: lies over {path.name}, which is enlarged and in "
+                f"metres, expected {STAGE_NAME}: put the edits into a layer over {STAGE_NAME}"
             )
 
 
@@ -66,12 +65,12 @@ def _wrong_fields(layer: Sdf.Layer, top: str) -> Iterator[tuple[str, str, str, s
     root = layer.pseudoRoot
     unit, axis = UsdGeom.Tokens.metersPerUnit, UsdGeom.Tokens.upAxis
     if root.HasInfo(unit) and not UsdGeom.LinearUnitsAre(root.GetInfo(unit), METERS_PER_UNIT):
-        effect = "this scales nothing, a stage's numbers are um"
+        effect = "the stage's numbers are in um and USD does not convert them"
         yield unit, f"{root.GetInfo(unit):g}", f"{METERS_PER_UNIT:g}", effect
     if root.HasInfo(axis) and root.GetInfo(axis) != UP_AXIS:
-        yield axis, str(root.GetInfo(axis)), str(UP_AXIS), "this turns nothing"
+        yield axis, str(root.GetInfo(axis)), str(UP_AXIS), "USD does not turn a layer"
     if top and layer.defaultPrim and not _leads_to(str(layer.defaultPrim), top):
-        effect = "other programs open that prim alone"
+        effect = "other programs open only the default prim"
         yield "defaultPrim", str(layer.defaultPrim), top, effect
 
 
@@ -90,6 +89,6 @@ def note_missing(stage: Usd.Stage) -> str:
         effect = f"open it {_FALLBACK_UNIT / METERS_PER_UNIT:.0f} times too large"
     lines = ", ".join(known[field] for field in lacks)
     return (
-        f"{layer.realPath}: states no {', no '.join(lacks)}, so other programs {effect}: write "
-        f"each on a line of its own between the parentheses at the top of the layer: {lines}"
+        f"{layer.realPath}: states no {', no '.join(lacks)}, so other programs {effect}: add a "
+        f"line for each between the parentheses at the top of the layer: {lines}"
     )

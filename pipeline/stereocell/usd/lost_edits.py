@@ -37,8 +37,8 @@ _OWN_BINDING = ("mesh", "addition", "group")
 _MOST_LINES = 3  # largest number of similar edits with a line each; more of them share one line
 _GROUPS = ("Xform", "Scope", "")  # types of prims that only group other prims
 _FLAT = (
-    "flattened, so edits that no bundle takes over can't be found: export a layer over stage.usda "
-    "instead"
+    "found a flattened stage, which hides the edits that no bundle takes over, expected a layer "
+    "over stage.usda: export such a layer"
 )
 _BUILT = "built"  # place of prims that the build wrote and that no reader uses
 
@@ -82,7 +82,7 @@ def describe(lost: Iterable[LostEdit]) -> Iterator[str]:
     for alike in groups.values():
         shown = alike if len(alike) <= _MOST_LINES else alike[:1]
         more = len(alike) - len(shown)
-        others = f" (and {more} others alike)" if more else ""
+        others = f" (and {more} similar ones)" if more else ""
         for edit in shown:
             yield f"{edit.what}{others} is not taken over: {edit.reason}"
 
@@ -116,8 +116,8 @@ def require_no_lost_edit(
         words = "1 edit" if len(found) == 1 else f"{len(found)} edits"
         lines = "\n".join(found)
         raise StageError(
-            f"{lines}\n{layer}: found {words} that {taker}, expected none with --strict: nothing "
-            "is written; remove them or leave --strict out"
+            f"{lines}\n{layer}: found {words} that {taker}, expected none with --strict: remove "
+            "the edits or leave out --strict; nothing was written"
         )
 
 
@@ -236,7 +236,7 @@ class _Finder:
             )
         if not own and prim.IsActive() and not opinion.variant:
             self._covered.add(path)
-            return LostEdit(str(path), "prim", "it stands in a variant that is not selected")
+            return LostEdit(str(path), "prim", "it is in a variant that is not selected")
         kind = str(own.GetTypeName()) if own else ""
         if kind in _GROUPS and not (own and own.IsAbstract()):
             return _Fate.COVERED  # by the lines on the prims below it
@@ -246,7 +246,7 @@ class _Finder:
             return LostEdit(f"{kind or 'prim'} {path}", kind, reason)
         reason = next(
             (why for known, why in ADDED.items() if kind == known or kind.endswith(known)),
-            "nothing in the bundle is made of prims of this type",
+            "the bundle uses no prims of this type",
         )
         return LostEdit(f"{kind} {path}", kind, reason)
 
@@ -266,7 +266,7 @@ class _Finder:
             return ""
         derived = DERIVED.get(place, {})
         if name in derived:
-            return derived[name] and f"it follows from other values: edit {derived[name]}"
+            return derived[name] and f"it is computed from other values: edit {derived[name]}"
         if reason := reason_of(name):
             return reason
         if attribute and _fallback(attribute) is not None:
@@ -300,12 +300,12 @@ class _Finder:
             return ""
         if attribute.HasAuthoredConnections() and not spec.HasInfo("connectionPaths"):
             sources = ", ".join(map(str, attribute.GetConnections()))
-            return f"its value comes from {sources}"
+            return f"a connection to {sources} gives its value"
         stack = attribute.GetPropertyStack(Usd.TimeCode.Default())
         for stronger in stack[: stack.index(spec)] if spec in stack else ():
             if stronger.HasDefaultValue() and stronger.layer in self._built:
                 file = Path(stronger.layer.realPath).name
-                return f"the stage's own value, in {file}, is stronger"
+                return f"the stage's own value in {file} is stronger"
         if opinion.name.startswith("xformOp:"):
             order = UsdGeom.Xformable(prim).GetXformOpOrderAttr().Get() or ()
             if opinion.name not in {str(name).removeprefix("!invert!") for name in order}:

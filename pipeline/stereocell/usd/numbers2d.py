@@ -53,7 +53,9 @@ def read_numbers(prim: Usd.Prim) -> dict[str, float]:
             continue
         expected = _outside(value, _limits()[attribute])
         if expected:
-            raise StageError(f"{prim.GetPath()}.{attribute}: {value:g}, expected it {expected}")
+            raise StageError(
+                f"{prim.GetPath()}.{attribute} is {value:g}, expected a number {expected}"
+            )
         found[field] = shortest(value)
     return found
 

@@ -75,11 +75,14 @@ def notes_on_additions(stage: Usd.Stage) -> Iterator[str]:
         if _is_subdivided_by_default(prim):
             yield (
                 f"subdivision of {prim.GetPath()}, which is USD's default, is not taken over: "
-                "surfaces are not subdivided here: apply it, or state subdivisionScheme none"
+                "apply it and export points, or set subdivisionScheme to none"
             )
         surface = _surface(prim)
         for file in maps_of(surface).files if surface else ():
-            yield f"image {file.name} of {prim.GetPath()} is not taken over: added meshes have none"
+            yield (
+                f"image {file.name} of {prim.GetPath()} is not taken over: the viewer draws added "
+                "meshes without images"
+            )
 
 
 def _is_subdivided_by_default(prim: Usd.Prim) -> bool:

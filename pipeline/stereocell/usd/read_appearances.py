@@ -45,7 +45,9 @@ def read_appearances(stage: Usd.Stage) -> list[ComposedAppearance]:
     found = [_read_appearance(prim) for prim in prims if prim.IsA(UsdShade.Material)]
     if not found:
         layer = stage.GetRootLayer().realPath
-        raise StageError(f"{layer}: no channel is active below {group}, expected one or more")
+        raise StageError(
+            f"{layer}: found no active channel below {group}, expected one or more: activate one"
+        )
     return found
 
 
@@ -53,10 +55,12 @@ def surface_of(prim: Usd.Prim) -> UsdShade.Shader:
     """Return the UsdPreviewSurface of a mesh's material. Raises StageError if it has none."""
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
     if not material:
-        raise StageError(f"{prim.GetPath()}: no material bound")
+        raise StageError(f"{prim.GetPath()}: found no bound material, expected one")
     surface, _, _ = material.ComputeSurfaceSource()
     if not surface or surface.GetShaderId() != "UsdPreviewSurface":
-        raise StageError(f"{material.GetPath()}: no UsdPreviewSurface as its surface")
+        raise StageError(
+            f"{material.GetPath()}.outputs:surface: found no UsdPreviewSurface, expected one"
+        )
     return surface
 
 
@@ -70,7 +74,9 @@ def material_of(surface: UsdShade.Shader) -> Material:
     if feeder(surface, "color") is None:
         diffuse = _color_source(surface)
         if diffuse is None:
-            raise StageError(f"{surface.GetPath()}.inputs:diffuseColor: no value")
+            raise StageError(
+                f"{surface.GetPath()}.inputs:diffuseColor: found no value, expected a colour"
+            )
         color = color_of(diffuse)
     # The defaults below are those of the specification of UsdPreviewSurface.
     emissive = _source(surface, "emissiveColor")
@@ -141,7 +147,10 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         if found := read_shapes(prim):
             shapes[name] = found
     if chosen not in functions:
-        raise StageError(f"{prim.GetPath()}: no transferFunction variant {chosen!r}")
+        raise StageError(
+            f"{prim.GetPath()}: transferFunction is {chosen!r}, expected one of "
+            f"{', '.join(functions)}: select one of them"
+        )
     window = _window(prim, "stereocell:window")
     return ComposedAppearance(
         prim.GetName(),
@@ -191,11 +200,14 @@ def _level(prim: Usd.Prim) -> StatedLevel | None:
 def _window(prim: Usd.Prim, name: str) -> tuple[float, float]:
     low, high = (shortest(number) for number in numbers_of(prim, name, 2))
     if not low < high:
-        raise StageError(f"{prim.GetPath()}.{name}: ({low:g}, {high:g}), expected them to rise")
+        raise StageError(
+            f"{prim.GetPath()}.{name} is ({low:g}, {high:g}), expected the first number below the "
+            "second"
+        )
     if max(-low, high) > MAX_VOXEL_VALUE:
         raise StageError(
-            f"{prim.GetPath()}.{name}: ({low:g}, {high:g}), expected voxel values within "
-            f"{MAX_VOXEL_VALUE:g}"
+            f"{prim.GetPath()}.{name} is ({low:g}, {high:g}), expected voxel values from "
+            f"{-MAX_VOXEL_VALUE:g} to {MAX_VOXEL_VALUE:g}"
         )
     return low, high
 
@@ -213,7 +225,7 @@ def _surface_confidence(prim: Usd.Prim, name: str) -> SurfaceConfidence:
         if value == confidence:
             return confidence
     known = ", ".join(get_args(SurfaceConfidence))
-    raise StageError(f"{prim.GetPath()}.{name}: {value!r}, expected one of {known}")
+    raise StageError(f"{prim.GetPath()}.{name} is {value!r}, expected one of {known}")
 
 
 def _opacity_points(prim: Usd.Prim) -> OpacityPoints:
@@ -223,11 +235,14 @@ def _opacity_points(prim: Usd.Prim) -> OpacityPoints:
         raise StageError(f"{field}: found {len(given)} pairs, expected at most {_MAX_POINTS}")
     points = tuple((float(x), float(y)) for x, y in given)
     if not points:
-        raise StageError(f"{field}: empty, expected pairs of intensity and opacity")
-    if not all(0 <= number <= 1 for point in points for number in point):
-        raise StageError(f"{field}: a number outside 0..1")
+        raise StageError(f"{field}: found no pairs, expected pairs of intensity and opacity")
+    outside = [number for point in points for number in point if not 0 <= number <= 1]
+    if outside:
+        raise StageError(f"{field}: found {outside[0]:g}, expected numbers from 0 to 1")
     if any(after[0] < before[0] for before, after in itertools.pairwise(points)):
-        raise StageError(f"{field}: intensities fall, expected them to rise")
+        raise StageError(
+            f"{field}: found falling intensities, expected rising ones: sort the pairs"
+        )
     return points
 
 
@@ -245,7 +260,7 @@ def _source(node: UsdShade.Shader | UsdShade.Material, name: str) -> Usd.Attribu
         return None
     if UsdShade.Output.IsOutput(attributes[0]):
         raise StageError(
-            f"{node.GetPath()}.inputs:{name}: comes from {attributes[0].GetPath()}, "
-            "expected a plain value"
+            f"{node.GetPath()}.inputs:{name}: found a connection to {attributes[0].GetPath()}, "
+            "expected a plain value: disconnect it"
         )
     return attributes[0]

@@ -20,7 +20,9 @@ def value_of(prim: Usd.Prim, name: str, expected: Sdf.ValueTypeName) -> Any:  # 
     """
     value = read_as(prim.GetAttribute(name), expected)
     if value is None:
-        raise StageError(f"{prim.GetPath()}.{name}: no value")
+        raise StageError(
+            f"{prim.GetPath()}.{name}: found no value, expected one of type {expected}"
+        )
     return value
 
 
@@ -35,7 +37,7 @@ def over_time(attribute: Usd.Attribute) -> str:
     """Return the error message for an animated attribute."""
     return (
         f"{attribute.GetPath()}: found values over time, expected one without a time: "
-        "nothing moves here, export one frame"
+        "export a single frame"
     )
 
 
@@ -44,7 +46,9 @@ def file_of(attribute: Usd.Attribute) -> Path:
     asset = read_as(attribute, Sdf.ValueTypeNames.Asset)
     if asset is None or not asset.resolvedPath:
         named = asset.path if asset is not None else ""
-        raise StageError(f"{attribute.GetPath()}: no file at {named!r}")
+        raise StageError(
+            f"{attribute.GetPath()}: found no file at {named!r}, expected one: correct the path"
+        )
     return Path(asset.resolvedPath)
 
 
@@ -58,7 +62,7 @@ def color_of(attribute: Usd.Attribute, value: Any = None) -> tuple[float, float,
     else:
         require_type(attribute.GetPath(), value, Sdf.ValueTypeNames.Color3f, may_be_nan=True)
     if value is None or not all(0 <= part <= 1 for part in value):
-        raise StageError(f"{attribute.GetPath()}: {value}, expected three numbers in 0..1")
+        raise StageError(f"{attribute.GetPath()} is {value}, expected three numbers from 0 to 1")
     r, g, b = (shortest(part) for part in value)
     return r, g, b
 
@@ -67,7 +71,9 @@ def numbers_of(prim: Usd.Prim, name: str, count: int) -> list[float]:
     """Return an attribute's numbers. Raises StageError unless there are `count`, all finite."""
     value = prim.GetAttribute(name).Get()
     if value is None:
-        raise StageError(f"{prim.GetPath()}.{name}: no value")
+        raise StageError(
+            f"{prim.GetPath()}.{name}: found no value, expected {count} finite numbers"
+        )
     try:
         numbers = [] if isinstance(value, str) else [float(part) for part in np.ravel(value)]
     except (TypeError, ValueError):
@@ -83,7 +89,9 @@ def sizes_of(prim: Usd.Prim, name: str, count: int) -> list[int]:
     """Return an attribute's whole numbers. Raises StageError unless there are `count`, none < 0."""
     numbers = numbers_of(prim, name, count)
     if not all(number >= 0 and number.is_integer() for number in numbers):
-        raise StageError(f"{prim.GetPath()}.{name}: found {numbers}, expected sizes in voxels")
+        raise StageError(
+            f"{prim.GetPath()}.{name}: found {numbers}, expected whole numbers of voxels"
+        )
     return [int(number) for number in numbers]
 
 

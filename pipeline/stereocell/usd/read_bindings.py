@@ -16,7 +16,7 @@ from stereocell.usd.specimen import specimen_of
 _BINDING = "material:binding"
 _COLLECTION = "collection"
 _TOKENS = UsdShade.Tokens
-_EDIT = f"inputs:color of {CHANNELS}/NAME changes surfaces and volumes"
+_EDIT = f"edit inputs:color of {CHANNELS}/NAME, which colours surfaces and volumes"
 
 
 def notes_on_bindings(stage: Usd.Stage) -> Iterator[str]:
@@ -42,12 +42,12 @@ def binding_fault(prim: Usd.Prim, relationship: Usd.Relationship, *, is_own: boo
     if not relationship.GetTargets():
         return ""
     if not _materials(relationship):
-        return "there is no such material"
+        return "the stage has no such material"
     if purpose := _purpose(relationship):
-        return f"it is bound for the purpose {purpose!r} alone; {_EDIT}"
+        return f"it is bound only for the purpose {purpose!r}: {_EDIT}"
     strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
     if strength != _TOKENS.strongerThanDescendants and not is_own:
-        return f"the channels' own materials are stronger; {_EDIT}"
+        return f"the channels' own materials are stronger: {_EDIT}"
     return ""
 
 

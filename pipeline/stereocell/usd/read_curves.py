@@ -40,8 +40,8 @@ def curve_lines(curves: UsdGeom.BasisCurves) -> Iterator[Line]:
     counts = [int(n) for n in read_as(curves.GetCurveVertexCountsAttr(), _Types.IntArray) or ()]
     if sum(counts) != len(points) or any(count < 2 for count in counts):
         raise StageError(
-            f"{path}.curveVertexCounts: found {counts!s:.60}, expected numbers of 2 or more that "
-            f"add up to {len(points)} points"
+            f"{path}.curveVertexCounts: found {counts!s:.60}, expected numbers of 2 or more whose "
+            f"sum is {len(points)}, the number of points"
         )
     is_cubic = curves.GetTypeAttr().Get() == UsdGeom.Tokens.cubic
     basis = str(curves.GetBasisAttr().Get())
@@ -67,7 +67,7 @@ def _widths(curves: UsdGeom.BasisCurves, points: NDArray[np.float64]) -> NDArray
         return given
     if len(given) > 1:
         raise StageError(
-            f"{curves.GetPath()}.widths: found {len(given)}, expected 1 or {len(points)}"
+            f"{curves.GetPath()}.widths: found {len(given)} numbers, expected 1 or {len(points)}"
         )
     usual = _WIDTH_SHARE * float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     return np.full(len(points), given[0] if len(given) else usual)
@@ -77,7 +77,10 @@ def _evaluate(values: NDArray[np.float64], basis: str, path: str) -> NDArray[np.
     """Return points along the spans of a cubic curve, including both ends."""
     step = 3 if basis == "bezier" else 1
     if len(values) < 4 or (len(values) - 4) % step:
-        raise StageError(f"{path}: found {len(values)} vertices, which make no {basis} curve")
+        expected = "4 or more" if step == 1 else "4, 7, 10, ..."
+        raise StageError(
+            f"{path}: found {len(values)} vertices, expected {expected} for a {basis} curve"
+        )
     along = np.linspace(0, 1, SAMPLES_PER_SPAN, endpoint=False)
     powers = np.stack([along**3, along**2, along, np.ones_like(along)], axis=1)
     matrix = np.array(_BASES[basis])

@@ -173,7 +173,9 @@ def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
         _, fed = _material(prim, surface_of(prim), channel_id)
         found = read_mesh(UsdGeom.Mesh(prim), np.eye(4), shown=fed, is_edited=True)
     if found is None:
-        raise StageError(f"{tile.GetPath()}/{channel_id}: lod{level} has no mesh any more")
+        raise StageError(
+            f"{tile.GetPath()}/{channel_id}: found no mesh at lod{level}, expected one: restore it"
+        )
     return found
 
 
@@ -209,6 +211,6 @@ def _edit_advice(level: int) -> str:
     An edit outside the `lod` variants overrides all levels, but fits one of them at most.
     """
     return (
-        f" at lod{level}: edit inside the variant lod=lod{level}, or override points, "
+        f" (lod{level}): edit inside the variant lod=lod{level}, or override points, "
         "faceVertexCounts, faceVertexIndices and normals together"
     )

@@ -133,8 +133,8 @@ def notes_on_lights(lights: StageLights | None) -> Iterator[str]:
     """Yield a message for each lamp that is left out or dimmed."""
     for name in lights.lost if lights else ():
         yield (
-            f"light {name!r} is not taken over: the viewer has {MAX_LAMPS} lamps, and others are "
-            "stronger"
+            f"light {name!r} is not taken over: the viewer has {MAX_LAMPS} lamps, and other lights "
+            "are brighter"
         )
     for lamp in lights.lamps if lights else ():
         if lamp.strength > MAX_STRENGTH:
@@ -184,7 +184,7 @@ def _radiance(light: Usd.Prim) -> NDArray[np.float64]:
     if intensity < 0 or color.min() < 0:
         raise StageError(
             f"{light.GetPath()}: found an intensity of {intensity:g} and a color of "
-            f"{', '.join(f'{part:g}' for part in color)}, expected no number below 0"
+            f"{', '.join(f'{part:g}' for part in color)}, expected numbers of 0 or more"
         )
     return np.asarray(color * intensity * 2.0**exposure)
 

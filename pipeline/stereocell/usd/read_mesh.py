@@ -100,7 +100,9 @@ def read_mesh(
         arrays = {name: array for name, (array, _) in values.items()}
         for name, array in arrays.items():
             if len(array) != len(points):
-                raise StageError(f"{path}: {len(array)} {name} for {len(points)} points")
+                raise StageError(
+                    f"{path}: found {len(array)} {name}, expected {len(points)}, one for each point"
+                )
     else:
         triangles, points, arrays = _split(path, points, indices, counts, corners, values)
     if "normals" not in arrays:
@@ -127,15 +129,26 @@ def _require_faces(
     path: Sdf.Path, counts: NDArray[np.int64], indices: NDArray[np.int64], points: int
 ) -> None:
     """Raise StageError if the faces contradict the other arrays or have too many corners."""
-    if counts.min() < 3 or counts.sum() != len(indices):
-        raise StageError(f"{path}: faceVertexCounts don't fit {len(indices)} faceVertexIndices")
+    if counts.min() < 3:
+        raise StageError(
+            f"{path}: faceVertexCounts[{counts.argmin()}]: found a face of {counts.min()} corners, "
+            "expected at least 3"
+        )
+    if counts.sum() != len(indices):
+        raise StageError(
+            f"{path}: found {len(indices)} faceVertexIndices, expected {counts.sum()}, the sum of "
+            "faceVertexCounts"
+        )
     if (most := int(counts.max())) > MAX_CORNERS:
         raise LargeFaceError(
             f"{path}: faceVertexCounts[{counts.argmax()}]: found a face of {most} corners, "
             f"expected at most {MAX_CORNERS}: triangulate it in the program that edited it"
         )
     if indices.min() < 0 or indices.max() >= points:
-        raise StageError(f"{path}: faceVertexIndices outside its {points} points")
+        raise StageError(
+            f"{path}: found faceVertexIndices from {indices.min()} to {indices.max()}, expected 0 "
+            f"to {points - 1}"
+        )
 
 
 def _fitting(
@@ -265,8 +278,10 @@ def _split(
     columns = {"points": points[indices]}
     for name, (array, kind) in values.items():
         expected = {"faceVarying": len(indices), "uniform": len(counts), "constant": 1}
-        if len(array) != expected.get(kind, len(points)):
-            raise StageError(f"{path}: {len(array)} {name} do not fit {kind} interpolation")
+        if len(array) != (wanted := expected.get(kind, len(points))):
+            raise StageError(
+                f"{path}: found {len(array)} {name}, expected {wanted} for {kind} interpolation"
+            )
         if kind == "uniform":
             array = np.repeat(array, counts, axis=0)
         elif kind == "constant":

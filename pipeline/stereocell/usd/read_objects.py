@@ -57,14 +57,17 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
     for name in map(str, ids):
         attribute = prim.GetAttribute(f"{COLUMN}{name}")
         if not attribute:
-            raise StageError(f"{prim.GetPath()}.{COLUMN}{name}: missing, expected a column's name")
+            raise StageError(
+                f"{prim.GetPath()}.{COLUMN}{name}: missing, expected an attribute for each name in "
+                f"{COLUMNS}"
+            )
         data = attribute.GetCustomData()
         categories = tuple(map(str, data.get("categories", ())))
         colors = _colors_of(attribute, data)
         if len(colors) != len(categories):
             raise StageError(
-                f"{attribute.GetPath()}: found {len(colors)} colours for {len(categories)} "
-                "categories, expected as many"
+                f"{attribute.GetPath()}: found {len(colors)} colours, expected {len(categories)}, "
+                "one for each category"
             )
         columns.append(
             Column(
@@ -132,7 +135,10 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
     count = len(labels)
     names = tuple(map(str, read_as(mesh.GetAttribute(NAMES), _Types.StringArray) or ()))
     if names and len(names) != count:
-        raise StageError(f"{mesh.GetPath()}.{NAMES}: found {len(names)}, expected {count}")
+        raise StageError(
+            f"{mesh.GetPath()}.{NAMES}: found {len(names)} names, expected {count}, one for each "
+            "object"
+        )
     primvars = UsdGeom.PrimvarsAPI(mesh)
     values = {}
     for column in columns:
@@ -142,7 +148,7 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
         if given is not None and found.shape != (count,):
             raise StageError(
                 f"{mesh.GetPath()}.primvars:{column.id}: found {len(found)} values, expected "
-                f"{count}, one an object"
+                f"{count}, one for each object"
             )
         values[column.id] = found if given is not None else np.full(count, np.nan, np.float32)
         if column.categories:
@@ -152,14 +158,17 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
     touching = read_as(mesh.GetAttribute(TOUCHING), _Types.UInt64Array)
     pairs = np.array(list(touching or ()), np.uint64)
     if len(pairs) % 2:
-        raise StageError(f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected pairs")
+        raise StageError(
+            f"{mesh.GetPath()}.{TOUCHING}: found {len(pairs)} labels, expected an even number, "
+            "since two objects touch"
+        )
     # Stages of earlier versions do not have the areas.
     given = read_as(mesh.GetAttribute(WALL_UM2), _Types.FloatArray, may_be_nan=True)
     areas = np.full(len(pairs) // 2, np.nan) if given is None else given
     if len(areas) != len(pairs) // 2:
         raise StageError(
-            f"{mesh.GetPath()}.{WALL_UM2}: found {len(areas)}, expected {len(pairs) // 2}, one a "
-            "wall"
+            f"{mesh.GetPath()}.{WALL_UM2}: found {len(areas)} areas, expected {len(pairs) // 2}, "
+            "one for each interface"
         )
     shown = shown_objects(mesh)
     assert shown is not None

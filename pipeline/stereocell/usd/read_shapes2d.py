@@ -33,7 +33,7 @@ def read_shapes(prim: Usd.Prim) -> Shapes:
     kinds = _as_long(prim, _KINDS, count, None)
     if count > MAX_SHAPES:
         raise StageError(
-            f"{prim.GetPath()}.{_BOXES}: {count} shapes, expected {MAX_SHAPES} at most"
+            f"{prim.GetPath()}.{_BOXES}: found {count} shapes, expected at most {MAX_SHAPES}"
         )
     tips = _as_long(prim, _TIPS, count, [(v0 + v1) / 2 for v0, v1, _, _ in boxes])
     colors = _as_long(prim, _COLORS, count, [(1.0, 1.0, 1.0, 1.0)] * count)
@@ -61,6 +61,7 @@ def _as_long(prim: Usd.Prim, name: str, count: int, default: list[Any] | None) -
         return default
     if len(values) != count:
         raise StageError(
-            f"{prim.GetPath()}.{name}: {len(values)} entries, expected {count}, as {_BOXES} has"
+            f"{prim.GetPath()}.{name}: found {len(values)} entries, expected {count}, one for each "
+            f"shape in {_BOXES}"
         )
     return values

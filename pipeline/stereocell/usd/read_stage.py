@@ -57,8 +57,8 @@ def open_stage(path: Path) -> Usd.Stage:
     for needed in (specimen.root, specimen.channels, specimen.tiles):
         if not stage.GetPrimAtPath(needed):
             raise StageError(
-                f"{path}: no prim {needed}, expected a StereoCell stage, or a layer over its "
-                f"{STAGE_NAME}"
+                f"{path}: found no prim {needed}, expected the {STAGE_NAME} of a build, or a layer "
+                f"over it: add {STAGE_NAME} to its sublayers"
             )
     _require_places(stage)
     return stage
@@ -71,9 +71,8 @@ def _require_places(stage: Usd.Stage) -> None:
         for old, new in layer.relocates:
             if old != root and (old.HasPrefix(root) or new.HasPrefix(root)):
                 raise StageError(
-                    f"{layer.realPath}: relocates {old} to {new or 'nothing'}, expected prims "
-                    "where the build wrote them, since tiles and channels are found by path: "
-                    "set a display name, or deactivate what shall not show"
+                    f"{layer.realPath}: relocates {old} to {new or 'nothing'}, expected the paths "
+                    "of the build: set a display name instead, or deactivate the prim"
                 )
 
 
@@ -103,7 +102,9 @@ def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
         along = np.array(point_of(group, name)) @ turn
         length = np.linalg.norm(along)
         if not length > 0:
-            raise StageError(f"{group.GetPath()}.{name}: found no length, expected a direction")
+            raise StageError(
+                f"{group.GetPath()}.{name}: found a vector of length 0, expected a direction"
+            )
         x, y, z = (float(part) for part in np.round(along / length, _SIDE_DIGITS) + 0.0)
         sides[side] = (x, y, z)
     return sides
@@ -122,7 +123,8 @@ def opening_cut_of(stage: Usd.Stage) -> tuple[Point, float] | None:
     length = float(np.linalg.norm(normal))
     if not 0 < length < FARTHEST_UM or not abs(offset) < FARTHEST_UM * length:
         raise StageError(
-            f"{root.GetPath()}.{OPENING_CUT}: found {normal}, {offset:g}, expected a plane"
+            f"{root.GetPath()}.{OPENING_CUT}: found {normal}, {offset:g}, expected the normal of a "
+            "plane and its offset in um"
         )
     x, y, z = (float(part) for part in np.round(np.array(normal) / length, _SIDE_DIGITS) + 0.0)
     return (x, y, z), offset / length
@@ -143,10 +145,13 @@ def hinted_box(tile: Usd.Prim) -> tuple[NDArray[np.float64], NDArray[np.float64]
     attribute = UsdGeom.ModelAPI(tile).GetExtentsHintAttr()
     hint = read_as(attribute, _Types.Float3Array, may_be_nan=True)
     if not hint:
-        raise StageError(f"{tile.GetPath()}.extentsHint: no value")
+        raise StageError(f"{tile.GetPath()}.extentsHint: found no value, expected two corners")
     corners = np.array(hint, np.float64)
     if len(corners) < 2 or not np.abs(corners).max() <= FARTHEST_UM:
-        raise StageError(f"{tile.GetPath()}.extentsHint: found {hint!s:.60}, expected two corners")
+        raise StageError(
+            f"{tile.GetPath()}.extentsHint: found {hint!s:.60}, expected two corners within "
+            f"{FARTHEST_UM:g} um"
+        )
     return move_box(corners[0], corners[1], to_world(tile))
 
 
@@ -172,8 +177,7 @@ def loaded(
 def _require_names(tile: Usd.Prim) -> None:
     """Raise StageError for a surface that readers can't find because a prim was renamed.
 
-    Surfaces are recognized by their API schema. A surface of an inactive channel is allowed to be
-    missing.
+    Surfaces are recognized by their API schema. Surfaces of an inactive channel are not checked.
     """
     stage = tile.GetStage()
     channels = specimen_of(stage).channels
@@ -185,10 +189,9 @@ def _require_names(tile: Usd.Prim) -> None:
         for mesh in branch.GetChildren():
             if SURFACE_API in mesh.GetAppliedSchemas():
                 raise StageError(
-                    f"{mesh.GetPath()}: a surface of the build whose tile, channel or mesh was "
-                    f"renamed, expected {tile.GetPath()}/CHANNEL/CHANNEL_{tile.GetName()} with a "
-                    f"channel of {channels}: give the prims their names back; their display names "
-                    "are free"
+                    f"{mesh.GetPath()}: found a renamed tile, channel or mesh, expected "
+                    f"{tile.GetPath()}/CHANNEL/CHANNEL_{tile.GetName()} with a channel of "
+                    f"{channels}: undo the renaming, and set display names instead"
                 )
 
 

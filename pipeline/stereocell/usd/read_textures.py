@@ -51,7 +51,7 @@ def read_image(path: Path | NDArray[np.uint8]) -> NDArray[np.uint8]:
         with Image.open(path) as file:
             image = file.convert("RGB")
     except OSError as error:
-        raise StageError(f"{path}: can't be read as an image: {error}") from error
+        raise StageError(f"{path}: can't be read ({error}), expected an image") from error
     width, height = (max(4, 4 * round(n / 4)) for n in image.size)
     if (width, height) != image.size:
         image = image.resize((width, height), Image.Resampling.LANCZOS)
@@ -89,5 +89,8 @@ def _image(surface: UsdShade.Shader, kind: Kind) -> Path | None:
     feed = FEEDS[kind]
     if feed.reader and shader.GetShaderId() == feed.reader:
         return None
-    wanted = f"a UsdUVTexture or a {feed.reader}" if feed.reader else "a UsdUVTexture"
-    raise StageError(f"{shader.GetPath()}: expected {wanted} to feed inputs:{feed.input}")
+    wanted = f"UsdUVTexture or {feed.reader}" if feed.reader else "UsdUVTexture"
+    raise StageError(
+        f"{shader.GetPath()}.info:id is {str(shader.GetShaderId())!r}, expected {wanted}, since it "
+        f"feeds inputs:{feed.input}"
+    )

@@ -44,7 +44,7 @@ def _representation(tile: Usd.Prim) -> Representation:
         if selected == known:
             return known
     raise StageError(
-        f"{tile.GetPath()}: representation {selected!r}, "
+        f"{tile.GetPath()}: representation is {selected!r}, "
         f"expected one of {', '.join(get_args(Representation))}"
     )
 
@@ -66,6 +66,6 @@ def _finest_lod(tile: Usd.Prim) -> int:
     match = _LOD.fullmatch(selected)
     if match is None or int(match[1]) not in levels:
         known = ", ".join(f"lod{level}" for level in levels)
-        raise StageError(f"{tile.GetPath()}: lod {selected!r}, expected one of {known}")
+        raise StageError(f"{tile.GetPath()}: lod is {selected!r}, expected one of {known}")
     level = int(match[1])
     return level if level > DEFAULT_LOD else 0

@@ -88,7 +88,7 @@ def notes_on_rolls(views: list[StageView]) -> Iterator[str]:
         if abs(view.roll_deg) > _MAX_ROLL_DEG:
             yield (
                 f"roll of camera {view.name!r}, {view.roll_deg:.0f} degrees, is not taken over: "
-                "the viewer keeps up upright"
+                "the viewer keeps the up axis vertical"
             )
 
 

@@ -55,8 +55,8 @@ def read_volume(tile: Usd.Prim, channel_id: str) -> ComposedVolume | None:
     (apron,) = sizes_of(prim, "stereocell:apron", 1)
     if min(width, height, depth) <= 2 * apron:
         raise StageError(
-            f"{prim.GetPath()}: found {width} x {height} x {depth} voxels, apron {apron}, "
-            "expected voxels inside it"
+            f"{prim.GetPath()}.stereocell:atlasSize: found {width}, {height}, {depth}, expected "
+            f"more than {2 * apron} voxels along each axis, since the apron has {apron}"
         )
     return ComposedVolume(
         file_of(prim.GetAttribute("stereocell:atlas")),

@@ -121,8 +121,8 @@ def _require_no_instance(root: Usd.Prim) -> None:
     while prim and not prim.IsPseudoRoot():
         if prim.IsInstance():
             raise StageError(
-                f"{prim.GetPath()}: is an instance, below which no tile can be loaded and no "
-                "variant chosen, expected none: write instanceable = false on it in a layer over "
+                f"{prim.GetPath()}: found an instance, whose tiles and variants USD can't select, "
+                "expected a plain prim: set its instanceable to false in a layer over "
                 f"{Path(prim.GetStage().GetRootLayer().realPath).name}"
             )
         prim = prim.GetParent()

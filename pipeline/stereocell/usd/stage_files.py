@@ -55,7 +55,10 @@ def _named_in(name: str) -> Iterator[tuple[str, str]]:
     except Tf.ErrorException:
         return
     if layer and layer.expressionVariables:  # stronger layers could change the paths
-        raise StageError(f"{name}: expressionVariables: found some, expected paths without them")
+        raise StageError(
+            f"{name}: found expressionVariables, expected none, because they change paths: write "
+            "plain paths"
+        )
     for asset in named:
         path = Sdf.ComputeAssetPathRelativeToLayer(layer, Sdf.Layer.SplitIdentifier(asset)[0])
         found = str(Ar.GetResolver().Resolve(path))

@@ -33,7 +33,10 @@ def read_as(
     try:
         value = attribute.Get()
     except Tf.ErrorException as error:
-        raise StageError(f"{attribute.GetPath()}: {one_line(error)}") from error
+        raise StageError(
+            f"{attribute.GetPath()}: can't be read, expected a value of type {expected}: "
+            f"{one_line(error)}"
+        ) from error
     if value is not None:
         require_type(attribute.GetPath(), value, expected, may_be_nan=may_be_nan)
     return value
@@ -60,7 +63,7 @@ def require_type(
     is_finite = np.isfinite(numbers)
     if not is_finite.all():
         found = numbers[~is_finite].flat[0]
-        raise StageError(f"{where}: found {found:g}, expected {expected} of finite numbers")
+        raise StageError(f"{where}: found {found:g}, expected finite numbers ({expected})")
 
 
 def _is_of(value: object, expected: Sdf.ValueTypeName) -> bool:
@@ -96,8 +99,8 @@ def usd_boundary(stage_path: Path) -> Iterator[None]:
         yield
     except Tf.ErrorException as error:
         raise StageError(
-            f"{stage_path}: USD refuses what it composes: {one_line(error)}: correct the "
-            "layer that holds it, or write the stage anew"
+            f"{stage_path}: found an error of USD ({one_line(error)}), expected a valid stage: "
+            "correct your layer, or run `stereocell stage OUT` again"
         ) from error
     finally:
         del quiet
@@ -109,5 +112,5 @@ def one_line(error: object) -> str:
     try:
         text = "; ".join(entry.commentary for entry in args) or str(error)
     except UnicodeDecodeError:  # the message quotes bytes that are not text
-        text = "a layer or a file of it is damaged"
+        text = "a layer or one of its files is damaged"
     return " ".join(text.split()).removesuffix(".")

@@ -79,7 +79,7 @@ def validate_usdz(path: Path) -> list[Finding]:
     unit, axis = UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)
     findings = [*_run_validators(stage), *_check_names(stage)]
     if (unit, axis) != (1.0, UP_AXIS):
-        message = f"metersPerUnit {unit} and upAxis {axis}, expected 1.0 and {UP_AXIS}"
+        message = f"metersPerUnit is {unit} and upAxis is {axis}, expected 1.0 and {UP_AXIS}"
         findings.append(Finding("units", str(path), message))
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.Mesh):
@@ -88,7 +88,8 @@ def validate_usdz(path: Path) -> list[Finding]:
             except StageError as error:  # a value of another type
                 findings.append(Finding("type", _place(prim), str(error)))
         elif prim.IsA(UsdVol.Volume):
-            findings.append(Finding("volume", _place(prim), "no client of usdz draws volumes"))
+            message = "found a volume, expected none, since no program draws volumes of usdz"
+            findings.append(Finding("volume", _place(prim), message))
     del quiet
     return findings
 
@@ -153,7 +154,7 @@ def _check_layers(stage: Usd.Stage) -> Iterator[Finding]:
         if not layer.defaultPrim or not layer.GetPrimAtPath(f"/{layer.defaultPrim}"):
             found = repr(str(layer.defaultPrim))
             yield Finding(
-                "defaultPrim", where, f"defaultPrim is {found}, expected one of its prims"
+                "defaultPrim", where, f"defaultPrim is {found}, expected the name of a root prim"
             )
 
 
@@ -166,7 +167,8 @@ def _check_names(stage: Usd.Stage) -> Iterator[Finding]:
     counts = Counter(prim.GetName() for prim in leaves)
     for prim in leaves:
         if counts[prim.GetName()] > 1:
-            message = f"{counts[prim.GetName()]} prims are called {prim.GetName()}, expected 1"
+            found = counts[prim.GetName()]
+            message = f"found {found} prims with the name {prim.GetName()}, expected 1"
             yield Finding("names", _place(prim), message)
 
 
@@ -211,14 +213,16 @@ def _check_mesh(mesh: UsdGeom.Mesh) -> Iterator[Finding]:
         _array(mesh.GetFaceVertexIndicesAttr(), _Types.IntArray),
     )
     if not np.isfinite(points).all():
-        yield Finding("mesh", where, "points holds numbers that are not finite")
+        yield Finding("mesh", where, "found points that are not finite, expected finite numbers")
         return
     if counts.sum() != len(indices) or (counts < 3).any():
-        message = f"{len(indices)} indices, expected {int(counts.sum())} for its faces of 3 or more"
+        message = (
+            f"found {len(indices)} indices, expected {int(counts.sum())}, in faces of 3 or more"
+        )
         yield Finding("mesh", where, message)
         return
     if len(indices) and (indices.min() < 0 or indices.max() >= len(points)):
-        span = f"indices from {int(indices.min())} to {int(indices.max())}"
+        span = f"found indices from {int(indices.min())} to {int(indices.max())}"
         yield Finding("mesh", where, f"{span}, expected 0 to {len(points) - 1}")
         return
     sizes = {"vertex": len(points), "varying": len(points), "faceVarying": len(indices)}
@@ -226,9 +230,11 @@ def _check_mesh(mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     normals = _array(mesh.GetNormalsAttr(), _Types.Normal3fArray)
     expected = sizes[mesh.GetNormalsInterpolation()]
     if len(normals) != expected or not np.isfinite(normals).all():
-        yield Finding("mesh", where, f"{len(normals)} normals, expected {expected} finite ones")
+        message = f"found {len(normals)} normals, expected {expected} finite ones"
+        yield Finding("mesh", where, message)
     elif _is_inside_out(mesh, points, counts, indices, normals):
-        yield Finding("mesh", where, "normals point against most faces, expected with them")
+        message = "found normals on the back of most faces, expected normals on the front"
+        yield Finding("mesh", where, message)
     for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvarsWithValues():
         found = len(primvar.ComputeFlattened() or ())
         wanted = sizes[primvar.GetInterpolation()] * primvar.GetElementSize()
@@ -271,7 +277,8 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
     where = _place(prim)
     fields = volume.GetFieldPaths()
     if not fields and not prim.HasAttribute("stereocell:atlas"):
-        yield Finding("volume", where, "0 fields and no atlas, expected one of them")
+        message = "found no field and no stereocell:atlas, expected one of them"
+        yield Finding("volume", where, message)
     files: set[str] = set()
     for name, path in sorted(fields.items()):
         asset = UsdVol.OpenVDBAsset(prim.GetStage().GetPrimAtPath(path))
@@ -280,17 +287,21 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
             files.add(file.resolvedPath or file.path if file else "")
             yield from _check_grid(prim, asset)
         else:
-            yield Finding("volume", where, f"field {name} is no OpenVDBAsset at {path}")
+            message = f"found no OpenVDBAsset at {path}, expected one for the field {name}"
+            yield Finding("volume", where, message)
     if len(files) > 1:
-        yield Finding("volume", where, f"{len(files)} files, expected 1: clients read one")
+        message = f"found {len(files)} files, expected 1, since programs read only one"
+        yield Finding("volume", where, message)
     low, high, size, apron = _box_of(prim)
     if low is None or high is None or size is None:
-        yield Finding("volume", where, f"lacks one of stereocell:{', stereocell:'.join(_BOX)}")
+        names = f"stereocell:{', stereocell:'.join(_BOX)}"
+        yield Finding("volume", where, f"found no value for one of {names}, expected all")
         return
     cells = np.array(size) - 2 * apron - 1
     box = np.array([low, high])
     if (cells < 1).any() or (box[1] <= box[0]).any():
-        yield Finding("volume", where, f"atlas of {list(size)} voxels in a box of {box.tolist()}")
+        message = f"found an atlas of {list(size)} voxels in a box of {box.tolist()}"
+        yield Finding("volume", where, f"{message}, expected two or more along each axis")
         return
     # The box goes from voxel centre to voxel centre, but the extent goes to the voxels' faces. So
     # they differ by half a voxel.
@@ -316,7 +327,7 @@ def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Findin
         return
     spacing = _voxel_spacing(volume)
     if spacing is not None and not np.allclose(grid.spacing, spacing, rtol=_TOLERANCE, atol=0):
-        message = f"voxels of {grid.spacing.tolist()} in {file}, expected {spacing.tolist()}"
+        message = f"found voxels of {grid.spacing.tolist()} in {file}, expected {spacing.tolist()}"
         yield Finding("grid", where, message)
 
 
@@ -359,7 +370,8 @@ def _check_extents_hint(model: UsdGeom.ModelAPI, boxes: UsdGeom.BBoxCache) -> It
     box, shown = np.array(list(hint)[:2]), np.array([list(drawn.GetMin()), list(drawn.GetMax())])
     tolerance = _TOLERANCE * float((box[1] - box[0]).max())
     if (shown[0] < box[0] - tolerance).any() or (shown[1] > box[1] + tolerance).any():
-        message = f"extentsHint {box.round(4).tolist()} does not hold {shown.round(4).tolist()}"
+        message = f"extentsHint is {box.round(4).tolist()}, expected a box round"
+        message += f" {shown.round(4).tolist()}"
         yield Finding("extent", _place(prim), message)
 
 
@@ -367,14 +379,17 @@ def _check_windows(prim: Usd.Prim) -> Iterator[Finding]:
     for name in ("window", "volumeWindow"):
         window = read_as(prim.GetAttribute(f"stereocell:{name}"), _Types.Float2)
         if window is not None and not window[0] < window[1]:
-            yield Finding("look", _place(prim), f"{name} is {window}, expected it to rise")
+            message = f"{name} is {window}, expected the first number below the second"
+            yield Finding("look", _place(prim), message)
 
 
 def _check_opacity(prim: Usd.Prim) -> Iterator[Finding]:
     points = _array(prim.GetAttribute("stereocell:opacityPoints"), _Types.Float2Array)
     rising = bool((np.diff(points[:, 0]) >= 0).all())
     if len(points) < 2 or not rising or points.min() < 0 or points.max() > 1:
-        message = f"opacityPoints {points.tolist()}, expected 2 or more, 0..1, intensity rising"
+        message = (
+            f"opacityPoints is {points.tolist()}, expected 2 or more pairs from 0 to 1, rising"
+        )
         yield Finding("look", _place(prim), message)
 
 

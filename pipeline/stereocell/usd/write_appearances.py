@@ -96,11 +96,11 @@ def level_to_json(level: SurfaceLevel) -> dict[str, Any]:
     return {
         "format": "stereocell-level",
         "version": 1,
-        "about": "The surface lies where the denoised voxels are background + iso. Axes z, y, x; "
-        "knots in voxels of the level that was built, values linear between them. Each voxel is "
-        "first clipped to the least and largest of its neighbours in hot_voxel_box, leaving out "
-        "those straight across the plane of median_voxels. Median and Gaussian then move its value "
-        "by at most max_shift (null: by any).",
+        "about": "The surface lies where the denoised voxels equal background + iso. Arrays have "
+        "the axes z, y, x. Positions of knots are in voxels of the resolution level that was "
+        "built. Between knots, values are linear. Each voxel is first clipped to the least and "
+        "largest of its neighbours in hot_voxel_box, without the two straight across the plane of "
+        "median_voxels. Median and Gaussian then change it by at most max_shift (null: no limit).",
         "iso": level.iso,
         "iso_by_tile": None if level.by_tile is None else level.by_tile.to_json(),
         "background": None if level.background is None else level.background.to_json(),

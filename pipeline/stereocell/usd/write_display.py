@@ -45,8 +45,8 @@ def write_display(
     layer.defaultPrim = display.name
     size = describe_size(box[1] - box[0])
     layer.documentation = (
-        f"The stage in metres, {scale:g} times the specimen, whose size is {size}. "
-        "To edit the specimen, put a layer over stage.usda; this one follows."
+        f"The stage in metres, enlarged {scale:g} times. The size of the specimen is {size}. "
+        "To edit the specimen, put a layer over stage.usda."
     )
     factor = scale * METERS_PER_UNIT
     stage = Usd.Stage.Open(layer, Usd.Stage.LoadNone)
@@ -54,7 +54,7 @@ def write_display(
     UsdGeom.SetStageUpAxis(stage, UP_AXIS)
     root = UsdGeom.Xform.Define(stage, display).GetPrim()
     root.SetDisplayName(name)
-    root.SetDocumentation(f"{name}: {size} in true size, {scale:g} times as large here, in metres.")
+    root.SetDocumentation(f"{name}: {size} in true size; {scale:g} times as large here, in metres.")
     model = Usd.ModelAPI(root)
     model.SetKind(Kind.Tokens.assembly)
     model.SetAssetName(name)

@@ -21,8 +21,8 @@ from stereocell.usd.layer import CHANNELS, ROOT, TILES, export, new_stage, set_a
 from stereocell.usd.written_files import NVINDEX_NAME, STAGE_NAME
 
 _DOMAIN = (0.0, 1.0)  # range of values of the grid `density`
-_NOTE = """The stage for NVIDIA IndeX: colour maps of all channels, and volumes drawn by it.
-Edits belong in a layer over stage.usda; the colour maps are those of the build."""
+_NOTE = """The stage for NVIDIA IndeX, which draws the volumes with a colour map of each channel.
+Put edits into a layer over stage.usda. The colour maps stay those of the build."""
 _SETTINGS = {"rtx:index:compositeEnabled": True, "rtx:index:compositeDepthMode": 3}
 
 _Types = Sdf.ValueTypeNames

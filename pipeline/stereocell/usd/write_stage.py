@@ -69,11 +69,12 @@ __all__ = ["LAYER_SUFFIXES", "SUBLAYERS", "TileExtent", "is_layer", "write_stage
 
 # Sublayers of contents.usda, strongest first
 SUBLAYERS = ("./looks/channels.usda", "./looks/lights.usda")
-_NOTE = """Edit in a layer of your own that has this one as a sublayer; a new build replaces
-these files. All content comes from contents.usda by a reference, so any opinion in your layers is
-stronger, in classes and variants too."""
-_CONTENTS_NOTE = """Tiles and cameras; see looks/ for colours and transfer functions, tiles/ for
-data. Edit in a layer over stage.usda: one over this layer is not known to `stereocell bundle`."""
+_NOTE = """Put edits into a layer of your own that has this layer as a sublayer, because a new build
+overwrites these files. All content comes from contents.usda by a reference. So any opinion in your
+layers is stronger, also in classes and variants."""
+_CONTENTS_NOTE = """Tiles and cameras. Colours and transfer functions are in looks/, the data in
+tiles/. Put edits into a layer over stage.usda. `stereocell bundle` does not know layers over this
+one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,8 +174,8 @@ def write_stage(
     UsdGeom.ModelAPI(root).SetExtentsHint(vec3f(whole))
     size = describe_size(whole[1] - whole[0])
     root.SetDocumentation(
-        f"{name}: {size} in true size, a unit is 1 um. Channels has the look of each channel, "
-        "Shown which of them show, Tiles the surfaces and volumes."
+        f"{name}: {size} in true size; a unit is 1 um. Channels holds the appearance of each "
+        "channel, Shown their visibility, and Tiles the surfaces and volumes."
     )
     scale = display_scale(float((whole[1] - whole[0]).max()))
     set_attribute(root, DISPLAY_SCALE, Sdf.ValueTypeNames.Double, scale)
@@ -188,7 +189,10 @@ def write_stage(
     export(layer, stage_dir / CONTENTS_NAME)
     version = _write_interface(stage_dir, name, provenance)
     write_display(stage_dir, name, version, whole, shown, scale)
-    return f"the specimen is {size}; {DISPLAY_NAME} has it {scale:.0f} times as large, in metres"
+    return (
+        f"the size of the specimen is {size}; {DISPLAY_NAME} shows it {scale:.0f} times as large, "
+        "in metres"
+    )
 
 
 def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> str:

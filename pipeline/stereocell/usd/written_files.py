@@ -33,10 +33,10 @@ from stereocell.usd.layer import LAYER_SUFFIXES, is_layer
 FILES, STAGE_NAME, CONTENTS_NAME = "files.json", "stage.usda", "contents.usda"
 NVINDEX_NAME = "nvindex.usda"
 DISPLAY_NAME = "display.usda"
-CHANGED = "changed since it was written: edited in place, or damaged"
-DOUBTFUL = "changed since it was written, not in size: damaged, or edited in place"
+CHANGED = "changed since it was written, by an edit or by damage"
+DOUBTFUL = "changed since it was written but kept its size, by damage or by an edit"
 REMEDY = "run `stereocell stage OUT`"
-ADVICE = "edits belong in a layer of your own over the stage"
+ADVICE = "put edits into a layer of your own over the stage"
 
 
 def write_list(stage_dir: Path, tiles: FileList, *others: Path) -> None:
@@ -53,7 +53,7 @@ def read_stage_list(stage_dir: Path) -> dict[str, Any]:
 # Content of a stage's files, by suffix. The only .usdc files are those of tiles.
 _PARTS = {
     ".vdb": "volumes for other programs",
-    ".exr": "volumes for the bundle, and looks",
+    ".exr": "volumes for the bundle, and lookup tables",
     ".usdc": "surfaces",
     ".png": "maps and previews",
     ".stl": "closed copies",
@@ -69,7 +69,7 @@ def describe_parts(listed: FileList) -> str:
         sizes[suffix if suffix in _PARTS else ""] += entry["bytes"]
     largest = sorted(sizes.items(), key=lambda part: -part[1])
     words = [
-        f"{size / 1e6:.1f} {_PARTS[suffix]} ({suffix})"
+        f"{size / 1e6:.1f} MB of {_PARTS[suffix]} ({suffix})"
         for suffix, size in largest
         if suffix and size
     ]
@@ -177,5 +177,5 @@ def _error_of(file: Path, fault: str) -> StageError:
         return StageError(f"{file}: missing: {REMEDY}")
     if fault == DOUBTFUL:
         return StageError(f"{file}: {fault}: remove it and {REMEDY}; {ADVICE}")
-    problem = f"damaged, not the bytes that {FILES} says"
+    problem = f"damaged, because its size or hash differs from {FILES}"
     return StageError(f"{file}: {problem}: remove it and {REMEDY}")

@@ -48,7 +48,7 @@ def check_units(out_folder: OutFolder) -> str:
             f"{(folder / file).relative_to(out_folder.out).as_posix()}: {fault}"
             for file, fault in unit_files.find_damage(folder).items()
         ]
-    removal = "remove what is damaged and " if problems else ""
+    removal = "remove the damaged files and " if problems else ""
     raise_on_all([*lists, *problems], f"{removal}{UNITS_AGAIN}")
     is_planned = not find_document_faults(out_folder, "plan")
     is_open = is_planned and not out_folder.plan().settings.surface.caps
@@ -84,11 +84,13 @@ def check_stage_hashes(out_folder: OutFolder) -> str:
         require()
     listed = read_json(out_folder.stage_list, "units.schema.json#FileList", written_files.REMEDY)
     if written_files.STAGE_NAME not in listed:
-        path = out_folder.stage_list
-        raise CheckError(f"{path}: damaged, not the list that was written: {written_files.REMEDY}")
+        raise CheckError(
+            f"{out_folder.stage_list}: found no {written_files.STAGE_NAME} in the list, so it is "
+            f"damaged: {written_files.REMEDY}"
+        )
     problems = written_files.find_damage(out_folder.stage_dir, listed)
     faults = [f"stage/{path}: {fault}" for path, fault in problems.items()]
-    remedy = f"remove what is damaged and {written_files.REMEDY}"
+    remedy = f"remove the damaged files and {written_files.REMEDY}"
     if {written_files.CHANGED, written_files.DOUBTFUL} & set(problems.values()):
         remedy += f"; {written_files.ADVICE}"
     raise_on_all(faults, remedy)
@@ -103,18 +105,18 @@ def check_stage(out: Path) -> str:
     dependencies(path, path.parent)  # this raises if the stage uses files outside its folder
     findings = validate_stage(path)
     raise_on([str(finding) for finding in findings])
-    return f"{path.name}: nothing found by UsdValidation and by our own rules"
+    return f"{path.name}: no fault found by UsdValidation and by StereoCell's own rules"
 
 
 def check_usdz(path: Path) -> str:
     """Check a .usdz by the validators of its format. A specimen without surfaces has no .usdz."""
     if not path.parent.is_dir():
-        raise CheckError(f"{path.parent}: missing, run `stereocell stage OUT`")
+        raise CheckError(f"{path.parent}: missing: run `stereocell stage OUT`")
     if not path.is_file():
         return f"no {path.name}: a specimen without surfaces has none"
     dependencies(path, path.parent)
     raise_on([str(finding) for finding in validate_usdz(path)])
-    return f"{path.name}: nothing found by the validators of usdz and by our own rules"
+    return f"{path.name}: no fault found by the validators of usdz and by StereoCell's own rules"
 
 
 def check_stage_files(out: Path) -> str:
@@ -125,7 +127,10 @@ def check_stage_files(out: Path) -> str:
     folder = out / "stage"
     paths = sorted(path for path in folder.rglob("*") if path.suffix in _WHOLE)
     if not paths:
-        raise CheckError(f"{folder}: no .exr and no .vdb file, expected those of its volumes")
+        raise CheckError(
+            f"{folder}: found no .exr and no .vdb file, expected the files of its volumes: "
+            f"{written_files.REMEDY}"
+        )
     problems = _lost_copies(out)
     for path in paths:
         try:
@@ -148,7 +153,7 @@ def _lost_copies(out: Path) -> list[str]:
     if not plan.settings.surface.closed_tiles:
         return []
     return [
-        f"{path}: missing, expected as surface.closed_tiles is on: run `stereocell stage OUT`"
+        f"{path}: missing, expected because surface.closed_tiles is on: run `stereocell stage OUT`"
         for tile in plan.tiles
         for channel in plan.channels
         for path in [closed_file(out_folder.stage_dir, tile.id, channel.id)]

@@ -32,11 +32,11 @@ def check_records(out_folder: OutFolder) -> str:
             faults.append(str(fault))
     if faults:
         raise CheckError("; ".join(faults))
-    return f"{provenance.name}, {settings.name} and {out_folder.phases_file.name} as written"
+    return f"{provenance.name}, {settings.name} and {out_folder.phases_file.name} are as written"
 
 
 def check_report(out_folder: OutFolder) -> str:
     """Check the report against the hash in it."""
     for check in checks_of(out_folder, "report"):
         check()
-    return f"{out_folder.report_file.name} as written"
+    return f"{out_folder.report_file.name} is as written"

@@ -81,7 +81,7 @@ def compare_tile(task: BundleTask) -> TileFinding:
             entry = find_volume(task.bundle, channel, task.tile_id)
             if (composed is None) != (entry is None):
                 which = ("stage", "bundle") if composed is None else ("bundle", "stage")
-                problems.append(f"{name}: the {which[0]} has no volume, the {which[1]} has one")
+                problems.append(f"{name}: the {which[0]} has no volume, but the {which[1]} has one")
             elif composed is not None and entry is not None:
                 problems += find_differences(name, entry, placement_of(composed))
                 voxels = read_windowed(composed, appearance)

@@ -18,13 +18,13 @@ from stereocell.verify.check_line import raise_on
 def check_manifest(bundle: Path) -> str:
     """Check the manifest against its schema and its own hash."""
     read_manifest(bundle)
-    return f"{MANIFEST} fits {SCHEMA}, as written"
+    return f"{MANIFEST} follows {SCHEMA} and is as written"
 
 
 def check_json(path: Path, schema: str, remedy: str) -> str:
     """Check one document against its schema."""
     read_json(path, schema, remedy)
-    return f"{path.name} fits {schema}"
+    return f"{path.name} follows {schema}"
 
 
 def check_usdz_of_bundle(bundle: Path) -> str:
@@ -33,7 +33,7 @@ def check_usdz_of_bundle(bundle: Path) -> str:
     if manifest.get("usdz") is None:
         return f"no {USDZ_NAME}: {manifest.get('usdz_reason') or 'the manifest names none'}"
     if not (bundle / USDZ_NAME).is_file():
-        raise CheckError(f"{USDZ_NAME}: missing, {REMEDY}")
+        raise CheckError(f"{USDZ_NAME}: missing: {REMEDY}")
     return check_usdz(bundle / USDZ_NAME)
 
 
@@ -49,7 +49,10 @@ def check_volume_lists(bundle: Path) -> str:
             texture = bundle / volume["file"]["path"]
             listed = [(level["offset"], level["length"]) for level in volume["levels"]]
             if _levels_of(texture, len(listed)) != listed:
-                problems.append(f"{path}: the levels of {volume['file']['path']} lie elsewhere")
+                problems.append(
+                    f"{path}: found other offsets of resolution levels, expected those in "
+                    f"{volume['file']['path']}"
+                )
                 continue
             problems += _damaged_levels(texture, volume)
     raise_on(problems)
@@ -78,8 +81,8 @@ def _damaged_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
                 found = hashlib.sha256(file.read(level["length"])).hexdigest()
                 if found != level["sha256"]:
                     problems.append(
-                        f"{volume['file']['path']}: level {k}: "
-                        f"expected SHA-256 {level['sha256']}, found {found}"
+                        f"{volume['file']['path']}: resolution level {k}: found SHA-256 {found}, "
+                        f"expected {level['sha256']}"
                     )
     except OSError as error:
         raise CheckError(f"{texture}: {error.strerror or error}") from error
@@ -109,8 +112,9 @@ def check_transfer2d(bundle: Path) -> str:
         functions = transfer2d_of(bundle, channel)["functions"]
         if list(functions) != listed["names"] or not set(functions) <= set(known):
             problems.append(
-                f"{listed['file']['path']}: functions are {', '.join(functions) or 'none'}, the "
-                f"manifest says {', '.join(listed['names']) or 'none'} of {', '.join(known)}"
+                f"{listed['file']['path']}: found functions {', '.join(functions) or 'none'}, "
+                f"expected {', '.join(listed['names']) or 'none'} as in the manifest, out of "
+                f"{', '.join(known)}"
             )
         for name, content in functions.items():
             count += len(content)
@@ -146,18 +150,20 @@ def check_objects(bundle: Path) -> str:
         sizes += [(column["bytes"], 1) for column in content["columns"]]
         sizes += [(column["exact"], 4) for column in content["columns"]]
         problems += [
-            f"{name}: {ref['path']} has {ref['bytes']} bytes, expected {count * width}"
+            f"{name}: {ref['path']}: found {ref['bytes']} bytes, expected {count * width}"
             for ref, width in sizes
             if ref["bytes"] != count * width
         ]
         problems += [
-            f"{name}: {column['exact']['path']}: parts have other SHA-256 than stated"
+            f"{name}: {column['exact']['path']}: found other SHA-256 of its parts, expected those "
+            "in the table"
             for column in content["columns"]
             if "parts" in column and not _has_parts(bundle / column["exact"]["path"], column)
         ]
         for tile, rows in content["tiles"].items():
-            if max([rows["first"] + rows["count"] - 1, *rows.get("more", [])]) >= max(count, 1):
-                problems.append(f"{name}: {tile}: names rows beyond the {count} that there are")
+            last = max([rows["first"] + rows["count"] - 1, *rows.get("more", [])])
+            if last >= max(count, 1):
+                problems.append(f"{name}: {tile}: found row {last}, expected rows below {count}")
     raise_on(problems)
     return f"{objects} objects"
 

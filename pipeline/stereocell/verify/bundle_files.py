@@ -45,9 +45,9 @@ def read_texels(file: Path) -> list[NDArray[np.uint8]]:
 
 
 def find_differences(
-    name: str, found: dict[str, Any], expected: dict[str, Any], whose: str = "the stage's"
+    name: str, found: dict[str, Any], expected: dict[str, Any], source: str = "the stage"
 ) -> Iterator[str]:
     """Yield a line for each key of `expected` with another value in `found`."""
     for key, value in expected.items():
         if found[key] != value:
-            yield f"{name}: {key} is {found[key]!r}, {whose} {value!r}"
+            yield f"{name}: {key} is {found[key]!r}, expected {value!r} as in {source}"

@@ -45,18 +45,21 @@ def _content_problems(content: Content) -> list[str]:
     name = f"{content.tileset}: {uri}"
     problems = []
     if content.error_m > content.limit_m:
-        problems.append(f"{name} has a larger geometricError than its parent")
+        problems.append(
+            f"{name}: geometricError is {content.error_m:g}, expected at most {content.limit_m:g} "
+            "as in its parent"
+        )
     try:
         expected = content.named["extras"][CONTENT_HASH]
     except (KeyError, TypeError):
-        return [*problems, f"{name} has no hash, expected extras.{CONTENT_HASH}"]
+        return [*problems, f"{name}: found no hash, expected extras.{CONTENT_HASH}"]
     if not content.path.is_file():
         if not content.is_tileset:  # `walk` has reported a missing tileset
-            problems.append(f"{content.tileset}: no file at {uri}")
+            problems.append(f"{content.tileset}: found no file at {uri}, expected one")
         return problems
     found = content_hash(measure(content.path)["sha256"])
     if found != expected:
-        problems.append(f"{name}: expected {CONTENT_HASH} {expected}, found {found}")
+        problems.append(f"{name}: found {CONTENT_HASH} {found}, expected {expected}")
     return problems
 
 
@@ -73,12 +76,12 @@ def check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
         if path not in found:
             problems.append(f"{path}: missing")
         elif measure(found[path]) != entry:
-            problems.append(f"{path}: not the bytes that {FILES} says")
+            problems.append(f"{path}: its size or hash differs from {FILES}")
     unlisted = found.keys() - listed.keys() - {MANIFEST, FILES}
     if PUBLISHED in found:
         problems += find_site_faults(found)
     else:
-        problems += [f"{path}: not in {FILES}" for path in unlisted]
+        problems += [f"{path}: found a file that {FILES} does not list" for path in unlisted]
     references = list(_references(manifest))
     for channel in channels_of(bundle):
         path = bundle / channel["volumes"]["path"]
@@ -91,10 +94,10 @@ def check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
         if reference["path"] == FILES:
             expected = measure(bundle / FILES)
         if entry != expected:
-            problems.append(f"{reference['path']}: a reference to it has another hash")
+            problems.append(f"{reference['path']}: a reference to it has another hash than {FILES}")
     if out_folder is not None and not _is_own_manifest(out_folder):
-        problems.append(f"{MANIFEST}: not the bytes that were written")
-    raise_on_all(sorted(problems), f"remove what is damaged and {REMEDY}")
+        problems.append(f"{MANIFEST}: its hash differs from the one that was written")
+    raise_on_all(sorted(problems), f"remove the damaged files and {REMEDY}")
     return f"{len(listed)} files, {len(references)} references"
 
 

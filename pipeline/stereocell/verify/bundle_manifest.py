@@ -41,17 +41,21 @@ def compare_manifest(stage_file: Path, bundle: Path) -> list[str]:
     tiles = [str(prim.GetName()) for prim in tile_prims(stage)]
     listed = [tile["id"] for tile in manifest["tiles"]]
     if tiles != listed:
-        problems.append(f"tiles are {', '.join(listed)}, the stage's {', '.join(tiles)}")
+        problems.append(
+            f"tiles are {', '.join(listed)}, expected {', '.join(tiles)} as in the stage"
+        )
     ends = [
         [pick(tile["bounds_um"][end][axis] for tile in manifest["tiles"]) for axis in range(3)]
         for end, pick in (("min", min), ("max", max))
     ]
     whole = {"bounds_um": dict(zip(("min", "max"), ends, strict=True))}
-    problems += find_differences("specimen", manifest["specimen"], whole, "its tiles'")
+    problems += find_differences("specimen", manifest["specimen"], whole, "its tiles")
     appearances = read_appearances(stage)
     ids = [appearance.id for appearance in appearances]
-    if ids != [channel["id"] for channel in manifest["channels"]]:
-        return [*problems, "the channels are not the stage's"]
+    found = [channel["id"] for channel in manifest["channels"]]
+    if ids != found:
+        words = f"channels are {', '.join(found)}, expected {', '.join(ids)} as in the stage"
+        return [*problems, words]
     for appearance, channel in zip(appearances, manifest["channels"], strict=True):
         problems += _compare_channel(appearance, channel, bundle)
     return problems
@@ -62,7 +66,10 @@ def _compare_channel(
 ) -> Iterator[str]:
     away = max(abs(a - b) for a, b in zip(appearance.color, channel["color"], strict=True))
     if away > COLOR_STEP:
-        yield f"{appearance.id}: color is {channel['color']}, the stage's {list(appearance.color)}"
+        yield (
+            f"{appearance.id}: color is {channel['color']}, expected {list(appearance.color)} as "
+            "in the stage"
+        )
     level = appearance.level
     expected = {
         "name": appearance.name,
@@ -89,14 +96,14 @@ def _compare_channel(
     if rows.shape != (len(appearance.transfer_functions), 256, 4):
         shape = " x ".join(map(str, rows.shape))
         yield (
-            f"{appearance.id}: its lookup table has {shape} values, expected "
+            f"{appearance.id}: found a lookup table of {shape} values, expected "
             f"{len(appearance.transfer_functions)} x 256 x 4"
         )
         return
     for row, (name, points) in zip(rows, appearance.transfer_functions.items(), strict=True):
         off = np.abs(row[:, 3] / 255 - evaluate(points)).max()
         if (row[:, :3] != 255).any() or off > COLOR_STEP:
-            yield f"{appearance.id}: the lookup table of {name!r} is not the stage's"
+            yield f"{appearance.id}: the lookup table of {name!r} differs from the stage"
 
 
 def compare_histograms(bundle: Path, joints: Sequence[Mapping[str, bytes]]) -> Iterator[str]:
@@ -112,5 +119,5 @@ def compare_histograms(bundle: Path, joints: Sequence[Mapping[str, bytes]]) -> I
         expected = log_scaled(counts)
         found = read_texels(bundle / shapes["histogram"]["path"])[0][0, ..., 0]
         if found.shape != expected.shape or (found != expected).any():
-            yield f"{name}: its histogram of value and gradient is not its volumes'"
-        yield from find_differences(name, shapes, {"most": int(counts.max())}, "its volumes'")
+            yield f"{name}: its histogram of value and gradient differs from its volumes"
+        yield from find_differences(name, shapes, {"most": int(counts.max())}, "its volumes")

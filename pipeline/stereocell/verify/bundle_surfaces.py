@@ -85,7 +85,7 @@ def compare_surfaces(
 
     The distance is in lattice steps.
     """
-    problems = [f"lod{level} is not in the stage" for level in contents if level not in lods]
+    problems = [f"the stage lacks lod{level}" for level in contents if level not in lods]
     problems += [f"the bundle lacks lod{level}" for level in sorted(lods.keys() - contents.keys())]
     worst, error_m, corners = 0.0, 0.0, []
     for level in sorted(contents.keys() & lods.keys()):
@@ -130,7 +130,7 @@ def _compare_boxes(
             lacks = max((centre - reach - low).max(), (high - centre - reach).max())
             exceeds = max((low - centre + reach).max(), (centre + reach - high).max())
             if lacks > slack or (k == 0 and exceeds > slack):
-                yield f"lod{level}: a box of the tileset is not round the surfaces: {list(box)}"
+                yield f"lod{level}: a box of the tileset does not fit the surfaces: {list(box)}"
                 break
 
 
@@ -149,13 +149,17 @@ def _compare_surface(
         lod = replace(lod, mesh=with_vertex_occlusion(lod))
     triangles = lod.mesh.triangles
     if len(drawn.triangles) != len(triangles):
-        return 0.0, [f"{len(drawn.triangles)} triangles, the stage has {len(triangles)}"]
+        found = f"found {len(drawn.triangles)} triangles"
+        return 0.0, [f"{found}, expected {len(triangles)} as in the stage"]
     places = lod.mesh.positions.astype(np.float64) / _UM_PER_METRE
     decoded = drawn.positions_m.astype(np.float64)
     # Half the diagonal of a lattice cell, plus the rounding of a viewer's float32 metres.
     limit_m = math.sqrt(3) / 2 * drawn.step_m + 4e-7 * float(np.abs(places).max())
     if (drawn.objects is None) != (lod.mesh.objects is None):
-        return 0.0, ["its vertices are of no object" if drawn.objects is None else "it has objects"]
+        which = ("bundle", "stage") if drawn.objects is None else ("stage", "bundle")
+        return 0.0, [
+            f"the vertices in the {which[0]} have no objects, but those in the {which[1]} have"
+        ]
     if drawn.objects is not None and lod.mesh.objects is not None:
         # Objects touch each other. They are moved apart along x, so that each is compared with
         # itself.
@@ -166,31 +170,36 @@ def _compare_surface(
     apart = max(_farthest(places, decoded), _farthest(there.mean(axis=1), here.mean(axis=1)))
     if apart > limit_m:
         problems.append(
-            f"a vertex is {apart * _UM_PER_METRE:.4g} um from its place, the lattice allows "
-            f"{limit_m * _UM_PER_METRE:.4g}"
+            f"a vertex is {apart * _UM_PER_METRE:.4g} um from its place in the stage, expected at "
+            f"most {limit_m * _UM_PER_METRE:.4g}"
         )
     else:
         problems += _compare_faces(there, here, triangles, drawn, lod.mesh)
     away = max(abs(a - b) for a, b in zip(drawn.color, lod.material.color, strict=True))
     if away > COLOR_STEP:
-        problems.append(f"drawn in {drawn.color}, the stage's colour is {lod.material.color}")
+        problems.append(
+            f"its colour is {drawn.color}, expected {lod.material.color} as in the stage"
+        )
     if abs(drawn.opacity - lod.material.opacity) > COLOR_STEP:
         problems.append(
-            f"drawn with opacity {drawn.opacity:g}, the stage's is {lod.material.opacity:g}"
+            f"its opacity is {drawn.opacity:g}, expected {lod.material.opacity:g} as in the stage"
         )
     glow = max(abs(a - b) for a, b in zip(drawn.emission, lod.material.emission, strict=True))
     if glow > COLOR_STEP:
-        problems.append(f"emits {drawn.emission}, the stage's light is {lod.material.emission}")
+        problems.append(
+            f"its emission is {drawn.emission}, expected {lod.material.emission} as in the stage"
+        )
     problems += _compare_vertex_colors(drawn, lod.mesh, places, decoded)
     problems += _compare_maps(drawn, lod, is_last)
     if (drawn.paint is None) != (lod.mesh.paint is None):
-        problems.append("the colour painted on its objects is missing, or the stage has none")
+        which = ("bundle", "stage") if drawn.paint is None else ("stage", "bundle")
+        problems.append(f"only the {which[1]}, not the {which[0]}, has colours painted on objects")
     elif drawn.paint is not None and lod.mesh.paint is not None:
         _, nearest = cKDTree(decoded).query(places)
         off = np.abs(drawn.paint[np.asarray(nearest)] - np.clip(lod.mesh.paint, 0, 1))
         if np.mean(off > COLOR_STEP) > _ODD_SHARE:
             problems.append(
-                f"{np.mean(off > COLOR_STEP):.0%} of its vertices are painted otherwise"
+                f"{np.mean(off > COLOR_STEP):.0%} of its vertices have another painted colour"
             )
     return apart / drawn.step_m, problems
 
@@ -220,13 +229,13 @@ def _compare_faces(
     off = np.linalg.norm(_means(mesh.normals, triangles) - _means(drawn.normals, here_of), axis=1)
     odd = float(areas[off > _TURNED].sum())
     if odd > _ODD_SHARE * whole:
-        yield f"{odd / whole:.0%} of its area is shaded by other normals"
+        yield f"{odd / whole:.0%} of its area has other normals"
     dimmed = _dimmed(mesh)
     if (dimmed is None) != (drawn.colors is None):
         yield (
-            "its vertices have colours, the stage's none"
+            "its vertices have colours, but those in the stage have none"
             if dimmed is None
-            else ("the occlusion at its vertices is lost")
+            else "the occlusion at its vertices is missing"
         )
     elif dimmed is not None and drawn.colors is not None:
         off = np.abs(dimmed[triangles].mean(axis=1) - drawn.colors[here_of].mean(axis=1))
@@ -240,7 +249,7 @@ def _compare_faces(
     off = np.abs(found - np.stack([wanted[:, 0], 1 - wanted[:, 1]], axis=1)).max(axis=1)
     odd = float(areas[off > _UV_STEP].sum())
     if odd > _ODD_SHARE * whole:
-        yield f"{odd / whole:.0%} of its area lies elsewhere in the maps"
+        yield f"{odd / whole:.0%} of its area has other texture coordinates"
 
 
 def _means(normals: NDArray[Any], triangles: NDArray[Any]) -> NDArray[np.float64]:
@@ -285,12 +294,12 @@ def _compare_vertex_colors(
     if mesh.colors is None:
         return
     if drawn.colors is None:
-        yield "the mesh's own colours are lost"
+        yield "the mesh's own colours are missing"
         return
     _, nearest = cKDTree(decoded).query(places)
     dimmed = np.asarray(drawn.colors[np.asarray(nearest)])  # occlusion may have dimmed the colours
     if float((dimmed - np.clip(mesh.colors, 0, 1)).max()) > 2 * COLOR_STEP:
-        yield "the mesh's own colours are others"
+        yield "the mesh's own colours differ from the stage"
 
 
 def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterator[str]:
@@ -299,7 +308,7 @@ def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterat
         named = path.name if isinstance(path, Path) else f"lod{lod.level}_{kind}"
         if path is None or (is_last and kind != "color" and name not in drawn.maps):
             if path is None and name in drawn.maps:
-                yield f"a map ({kind}) that the stage has not"
+                yield f"found a map ({kind}), but the stage has none"
             continue  # the coarsest level needs no maps
         if name not in drawn.maps:
             yield f"the map {named} is missing"
@@ -309,4 +318,4 @@ def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterat
             continue
         found, wanted = (decode_map(map_).astype(np.float64) for map_ in (drawn.maps[name], again))
         if found.shape != wanted.shape or np.abs(found - wanted).mean() > _MAP_DIFFERENCE:
-            yield f"the map {named} is another image in the stage"
+            yield f"the map {named} differs from the image in the stage"

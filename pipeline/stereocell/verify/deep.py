@@ -13,6 +13,7 @@ from stereocell.bundle.manifest import MANIFEST
 from stereocell.engine.run import Engine
 from stereocell.engine.run_steps import with_inputs
 from stereocell.isosurface.lifted_by_noise import Lifted
+from stereocell.model.counted import counted
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.unit import Cover
 from stereocell.planning.channels import Channel
@@ -41,13 +42,13 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
     out_folder = OutFolder(out)
     if not out_folder.plan_file.exists() and (out / MANIFEST).is_file():
         raise OutputError(
-            f"{out}: found a bundle without its build, expected OUT with its plan.json, since "
-            "--deep compares a bundle with the stage that it was exported from"
+            f"{out}: found a bundle without its build, expected OUT with its plan.json, because "
+            "--deep compares a bundle with its stage: name the OUT of the build"
         )
     if out.is_file():
         raise OutputError(
-            f"{out}: found a scene in one file, expected OUT with its plan.json, since --deep "
-            "compares a bundle with the stage that it was exported from"
+            f"{out}: found a scene in one file, expected OUT with its plan.json, because --deep "
+            "compares a bundle with its stage: name the OUT of the build"
         )
     plan = out_folder.plan()
     exported, bundle = stage or out_folder.stage_file, out_folder.bundle_dir
@@ -116,9 +117,9 @@ def _compare_tiles(out_folder: OutFolder, plan: Plan) -> str:
     planned = {tile.id for tile in plan.tiles}
     raise_on(
         [f"{name} is missing" for name in sorted(planned - there)]
-        + [f"{name} is not of the plan" for name in sorted(there - planned)]
+        + [f"{name} is not in the plan" for name in sorted(there - planned)]
     )
-    return f"{len(there)}, as planned"
+    return f"{counted(len(there), 'tile')}, as planned"
 
 
 def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
@@ -132,7 +133,7 @@ def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
     for channel in plan.channels:
         built, appearance = survey[channel.id].appearance, appearances.get(channel.id)
         if appearance is None:
-            yield f"{channel.id}: it is not in the stage"
+            yield f"{channel.id}: missing in the stage"
             continue
         for name, found, wanted in (
             ("isoValue", (appearance.iso_value,), (built.iso_value,)),
@@ -141,7 +142,7 @@ def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
         ):
             if found != tuple(None if value is None else shortest(value) for value in wanted):
                 stated, expected = (", ".join(map(str, one)) for one in (found, wanted))
-                yield f"{channel.id}: {name} is {stated}; {expected} was found"
+                yield f"{channel.id}: {name} is {stated}, expected {expected} as in the build"
 
 
 def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
@@ -189,8 +190,8 @@ def _channel_lines(
         yield CheckLine(
             f"{channel.name} lod{level} against source",
             not any(line.startswith(f"lod{level}: ") for unit in units for line in unit.problems),
-            f"{len(rows)} surfaces within {found:.4g} um, {stated:.4g} stated; at most "
-            f"{largest:.4g}",
+            f"{len(rows)} surfaces within {found:.4g} um (the stage states {stated:.4g}); largest "
+            f"distance {largest:.4g} um",
         )
     problems = [problem for problem in odd if problem.startswith(f"{channel.id}: ")]
     problems += [f"{unit.name}: {problem}" for unit in units for problem in unit.problems]
@@ -201,7 +202,7 @@ def _channel_lines(
         tiles = {unit.name.split("/")[0] for unit in units}
         noise = sum_lifted(lifted[tile] for tile in tiles & set(lifted))
         shares = f"; {SurfaceCover.of(total, noise).words}" if total.source else ""
-        return f"{len(units)} units: surfaces as stated, volumes equal, also as measured{shares}"
+        return f"{len(units)} units: surfaces as stated, volumes equal to the source{shares}"
 
     yield _line(f"{channel.name} against source", sum_up)
 
@@ -221,6 +222,6 @@ def _compare_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
     worst = max((tile.worst for tile in tiles), default=0.0)
     return (
         f"{surfaces} surfaces within {worst:.2f} lattice steps, their colours and maps; "
-        f"{volumes} volumes, every voxel of every level, their bricks and histograms"
+        f"{volumes} volumes, all voxels of all resolution levels, their bricks and histograms"
         + (f"; {edits}" if edits else "")
     )

@@ -55,7 +55,7 @@ def check(out: Path) -> Iterator[CheckLine]:
         checks = _checks_of_bundle(out, None)
     else:
         raise OutputError(
-            f"{out}: holds no build, expected plan.json, stage/ and bundle/, "
+            f"{out}: found no build, expected plan.json, stage/ and bundle/, "
             f"or a bundle's {MANIFEST}: run `stereocell build INPUT -o OUT` first"
         )
     for name, run in checks:

@@ -32,14 +32,16 @@ def check_textures(bundle: Path) -> str:
 def _run_node(script_name: str, paths: list[Path]) -> str:
     """Run one script of viewer_gltf/tools on all files at once. Raises CheckError."""
     if not paths:
-        raise CheckError("no file to check, expected some in the bundle")
+        raise CheckError("found no file to check, expected some in the bundle")
     try:
         script = find_asset(f"viewer_gltf/tools/{script_name}")
     except FileNotFoundError as error:
-        raise CheckError(f"{script_name} comes with a checkout of StereoCell only") from error
+        raise CheckError(
+            f"{script_name}: missing, because only a checkout of StereoCell has it: check there"
+        ) from error
     node = shutil.which("node")
     if node is None:
-        raise CheckError(f"no `node` to run {script_name}: install Node 20.19 or newer")
+        raise CheckError(f"found no `node` to run {script_name}: install Node 20.19 or newer")
     try:
         answer = subprocess.run(
             [node, str(script)],
@@ -50,7 +52,7 @@ def _run_node(script_name: str, paths: list[Path]) -> str:
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise CheckError(f"{script_name} was not done after {_NODE_TIMEOUT_S:g} s") from error
+        raise CheckError(f"{script_name} did not finish in {_NODE_TIMEOUT_S:g} s") from error
     if "ERR_MODULE_NOT_FOUND" in answer.stderr:
         raise CheckError(f"{script.parent.parent}: its node packages are missing: run `make setup`")
     if answer.returncode != 0:

@@ -111,14 +111,14 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
             worst[level] = max(worst[level], bias)
             if bias > own.bias[level] + _CLOSE:
                 problems.append(
-                    f"{tile.id}/{labels.id}: lod{level}: an object's volume is {bias:.2%} from its "
-                    f"voxels', {own.bias[level]:.2%} is stated"
+                    f"{tile.id}/{labels.id}: lod{level}: the volume of an object differs by "
+                    f"{bias:.2%} from its voxels, expected at most {own.bias[level]:.2%} as stated"
                 )
     raise_on(problems)
     biases = ", ".join(f"{share:.2%}" for share in worst)
     return (
         f"{len(table.labels)} objects, {len(table.columns)} columns equal to a new count and join; "
-        f"volumes of their surfaces by level within {biases or 'nothing'}"
+        f"volumes of their surfaces, from lod0 on, within {biases or 'nothing'}"
     )
 
 
@@ -169,7 +169,7 @@ def _odd_interfaces(
         off = np.abs(known["contact"][rows] - share) > most
         odd["contact"] += names[off & ~np.isin(names, cut)].tolist()
     return [
-        f"{labels.id}: column {column} is not that of the surface of {_shown(found)}"
+        f"{labels.id}: column {column} differs from the surfaces of {_shown(found)}"
         for column, found in odd.items()
         if found
     ]
@@ -214,7 +214,8 @@ def _odd_intensities(
             if not right.all():
                 shown = _shown(names[~right].tolist())
                 problems.append(
-                    f"{labels.id}: column {column.id} is not the voxels' {kind} of {shown}"
+                    f"{labels.id}: column {column.id} differs from the {kind} of the voxels of "
+                    f"{shown}"
                 )
     return problems
 
@@ -253,7 +254,8 @@ def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
         return [f"the stage has no objects, expected {len(own.labels)}"] if len(own.labels) else []
     if there.labels.tolist() != own.labels.tolist():
         return [
-            f"the stage has {len(there.labels)} objects, others than the {len(own.labels)} found"
+            f"found {len(there.labels)} objects in the stage, expected the {len(own.labels)} "
+            "objects of the label map"
         ]
     found = []
     for column in own.columns:
@@ -264,7 +266,7 @@ def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
         same = np.isclose(values, column.values, rtol=1e-5, atol=1e-6, equal_nan=True)
         if not same.all():
             shown = ", ".join(map(str, own.labels[~same][:_SHOWN].tolist()))
-            found.append(f"column {column.id} has other values of {shown}")
+            found.append(f"column {column.id} has other values for the objects {shown}")
     return found
 
 
@@ -290,7 +292,7 @@ def _odd_areas(
     for column, odd in (("area_um2", off & whole), ("sphericity", uneven & (stated > 0))):
         if odd.any():
             shown = ", ".join(map(str, there.labels[odd][:_SHOWN].tolist()))
-            found.append(f"column {column} is not that of the surface of {shown}")
+            found.append(f"column {column} differs from the surfaces of {shown}")
     return found
 
 

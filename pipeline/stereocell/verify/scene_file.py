@@ -72,7 +72,9 @@ def _read(file: Path) -> SceneBlocks:
     except OSError as error:
         raise CheckError(f"can't be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise CheckError(f"byte {error.start} is no UTF-8, so it is damaged: {REMEDY}") from None
+        raise CheckError(
+            f"found byte {error.start} outside of UTF-8, so it is damaged: {REMEDY}"
+        ) from None
     if not document.endswith("</html>\n"):
         raise CheckError(f"ends before </html>, so a part of it is missing: {REMEDY}")
     return read_blocks(document)
@@ -96,22 +98,27 @@ class _Page(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         words = {name: value or "" for name, value in attrs}
         if tag not in _TAGS:
-            self.problems.append(f"the page has an element <{tag}>")
+            self.problems.append(f"found an element <{tag}>, expected none")
         for name in _ADDRESS & words.keys():
             if not words[name].startswith("data:"):
-                self.problems.append(f"<{tag}> names the address {words[name]:.60}")
-        self.problems += [f"<{tag}> runs {name}" for name in words if name.startswith("on")]
+                self.problems.append(
+                    f"found the address {words[name]:.60} in <{tag}>, expected none"
+                )
+        handlers = [name for name in words if name.startswith("on")]
+        self.problems += [f"found a script {name} in <{tag}>, expected none" for name in handlers]
         if (kind := words.get("http-equiv", "").lower()) == "content-security-policy":
             if self.scripts:
-                self.problems.append("its policy stands behind a script")
+                self.problems.append(
+                    "found a script before the policy, expected it after the policy"
+                )
             self.policies.append(words.get("content", ""))
         elif kind:
-            self.problems.append(f"the page has <meta http-equiv={kind:.30}>")
+            self.problems.append(f"found <meta http-equiv={kind:.30}>, expected only the policy")
         self._in_script = tag == "script"
         if self._in_script:
             self.scripts.append("")
             if words:
-                self.problems.append("a block is not as `stereocell export` writes it")
+                self.problems.append("found a block that `stereocell export` does not write")
 
     def handle_endtag(self, tag: str) -> None:
         self._in_script = False
@@ -126,29 +133,29 @@ def _check_page(content: SceneBlocks) -> str:
     page = _Page(content.rest)
     problems = list(page.problems)
     if len(page.policies) != 1:
-        problems.append(f"the page has {len(page.policies)} policies, expected one")
+        problems.append(f"found {len(page.policies)} policies, expected one")
     if len(page.scripts) != 1:
-        problems.append(f"the page has {len(page.scripts)} scripts beside its blocks, expected one")
+        problems.append(f"found {len(page.scripts)} scripts beside the blocks, expected one")
     for policy in page.policies:
         problems += _problems_of(policy, page.scripts)
     if content.view and not VIEW.fullmatch(content.view):
         problems.append(f"its view is {content.view:.60}, expected the end of a link, from #v=1 on")
     raise_on([f"{problem}: {REMEDY}" for problem in problems[:1]])
-    return "one script, which its policy names; no address of a host"
+    return "one script, which the policy allows; no address of a host"
 
 
 def _problems_of(policy: str, scripts: Sequence[str]) -> Iterator[str]:
     rules = {name: sources for name, *sources in map(str.split, policy.split(";")) if name}
     if rules.get("default-src") != ["'none'"]:
-        yield "its policy has no default-src 'none'"
+        yield "found a policy without default-src 'none', expected one with it"
     for name, sources in rules.items():
         for source in sources:
             if not _INNER.fullmatch(source):
-                yield f"its policy lets {name} reach {source:.60}"
+                yield f"found {source:.60} in {name} of the policy, expected nothing from outside"
     for script in scripts:
         digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
         if f"'sha256-{digest}'" not in rules.get("script-src", []):
-            yield "its script is not the one of its policy, so browsers refuse to run it"
+            yield "found a script that the policy does not allow, so browsers refuse to run it"
 
 
 def _is_within(path: str) -> bool:
@@ -159,7 +166,7 @@ def _is_within(path: str) -> bool:
 def _check_blocks(content: SceneBlocks) -> str:
     """Check that the viewer's code and a bundle are present, at paths within their folder."""
     problems = [
-        f"{path}: expected a path within the bundle"
+        f"{path}: found a path outside of the bundle, expected one within it"
         for path in content.files
         if not _is_within(path)
     ]

@@ -18,7 +18,7 @@ def find_site_faults(found: Mapping[str, Path]) -> list[str]:
     try:
         listed = dict(json.loads(found[PUBLISHED].read_bytes())["files"])
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        return [f"{PUBLISHED}: damaged, no list of published files: {_AGAIN}"]
+        return [f"{PUBLISHED}: found no list of published files, so it is damaged: {_AGAIN}"]
     faults = []
     for path, entry in listed.items():
         if entry is None:
@@ -26,5 +26,5 @@ def find_site_faults(found: Mapping[str, Path]) -> list[str]:
         elif path not in found:
             faults.append(f"{path}: {MISSING}: {_AGAIN}")
         elif measure(found[path]) != entry:
-            faults.append(f"{path}: not the bytes that {PUBLISHED} says: {_AGAIN}")
+            faults.append(f"{path}: its size or hash differs from {PUBLISHED}: {_AGAIN}")
     return faults

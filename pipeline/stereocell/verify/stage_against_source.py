@@ -101,13 +101,13 @@ def compare_unit(task: SourceTask) -> UnitFinding:
         composed = read_volume(tile, task.channel_id)
         record = load_record(task.directory)
         if cover_of(record) != cover:
-            problems.append("the share of the source's voxels that it covers is not as recorded")
+            problems.append("the share of voxels inside its surface differs from the record")
         surfaces = _Surfaces(fine, given, task.placement, task.samples)
         levels, faults = _compare_lods(surfaces, lods, record)
         problems += faults
         problems += _compare_shading(lods, load_lods(task.directory), task.placement)
         if composed is None and not task.shares_volume:
-            problems.append("no volume in the stage")
+            problems.append("found no volume in the stage, expected one")
         elif composed is not None:
             problems += _compare_volume(
                 cut_voxels(volume.voxels, given.lattice, given.holder), composed, task
@@ -155,12 +155,13 @@ def _compare_lods(
     if not len(surfaces.triangles) or not lods:
         if len(surfaces.triangles):
             return (), [
-                f"the source has a surface of {len(surfaces.triangles)} triangles, the stage none"
+                f"found no surface in the stage, expected one as in the source, which gives "
+                f"{len(surfaces.triangles)} triangles"
             ]
-        return (), ["the source has no surface, the stage has one"] if lods else []
+        return (), ["found a surface, expected none, as the source gives none"] if lods else []
     problems = []
     if len(lods) < len(record["lods"]):
-        problems.append(f"{len(lods)} levels of detail, {len(record['lods'])} were built")
+        problems.append(f"found {len(lods)} levels of detail, expected {len(record['lods'])}")
     levels = []
     for lod in lods:
         to_fine = surfaces.at(lod.level)
@@ -172,12 +173,13 @@ def _compare_lods(
         name = f"lod{lod.level}"
         if found > _slack(lod.distance_um):
             problems.append(
-                f"{name}: {found:.4g} um from the iso-surface, the stage states "
-                f"{lod.distance_um:.4g}"
+                f"{name}: found {found:.4g} um to the iso-surface, expected {lod.distance_um:.4g} "
+                "as stated"
             )
         if largest > _slack(lod.largest_um):
             problems.append(
-                f"{name}: up to {largest:.4g} um away, the stage states {lod.largest_um:.4g}"
+                f"{name}: found {largest:.4g} um as the largest distance, expected "
+                f"{lod.largest_um:.4g} as stated"
             )
         if _facing(lod.mesh, to_fine) < 0:
             problems.append(f"{name}: its triangles face inwards")
@@ -185,7 +187,9 @@ def _compare_lods(
         most_um = max(stored["distance_um"], quality.away.max, quality.back.max)
         for stated, built in ((lod.distance_um, stored["distance_um"]), (lod.largest_um, most_um)):
             if abs(stated - built) > _HAIR_UM + 1e-5 * built:
-                problems.append(f"{name}: the stage states {stated:.4g} um, the unit {built:.4g}")
+                problems.append(
+                    f"{name}: the stage states {stated:.4g} um, expected {built:.4g} as in the unit"
+                )
     return tuple(levels), problems
 
 
@@ -215,7 +219,7 @@ def _compare_shading(
     for lod in lods:
         wanted = built[min(lod.level, len(built) - 1)]
         for part in _odd_shading(lod, wanted, placement):
-            odd.append(f"lod{lod.level}: its {part} not the unit's")
+            odd.append(f"lod{lod.level}: differs from the unit in its {part}")
     return odd
 
 
@@ -223,21 +227,21 @@ def _odd_shading(lod: ComposedLod, wanted: Lod, placement: Matrix) -> Iterator[s
     mesh, maps, baked = lod.mesh, lod.maps, wanted.baked
     if mesh.normals.shape != wanted.mesh.normals.shape:
         if maps.normal is not None and mesh.uvs is not None and wanted.mesh.uvs is not None:
-            yield "UVs are"
+            yield "UVs"
         return  # the vertices differ; their distances are compared elsewhere
     turned = wanted.mesh.normals.astype(np.float64) @ np.linalg.inv(np.array(placement)[:3, :3])
     if (_unit(mesh.normals) * _unit(turned)).sum(axis=1).min(initial=1) < _ALONG:
-        yield "normals are"
+        yield "normals"
     if wanted.normal_map is None:
         if baked is not None and not _is_like(mesh.openness, baked.openness / 255.0):
-            yield "occlusion at vertices is"
+            yield "occlusion at vertices"
         return
     if not _is_like(mesh.uvs, wanted.mesh.uvs):
-        yield "UVs are"
+        yield "UVs"
     if not _is_image(maps.normal, wanted.normal_map):
-        yield "normal map is"
+        yield "normal map"
     if baked is not None and not _is_image(maps.occlusion, baked.openness):
-        yield "occlusion map is"
+        yield "occlusion map"
 
 
 def _unit(vectors: NDArray[Any]) -> NDArray[np.float64]:
@@ -262,7 +266,7 @@ def _is_image(file: Path | None, wanted: NDArray[np.uint8]) -> bool:
         with Image.open(file) as image:
             found = np.asarray(image)
     except OSError as error:
-        raise StereoCellError(f"{file}: can't be read as an image: {error}") from error
+        raise StereoCellError(f"{file}: can't be read ({error}), expected an image") from error
     return np.array_equal(found, wanted)
 
 
@@ -277,17 +281,18 @@ def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTa
     stored = read_atlas(atlas)
     if stored.shape != eight_bit.shape:
         return [
-            f"{atlas.name}: {stored.shape} voxels (z, y, x), the source gives {eight_bit.shape}"
+            f"{atlas.name}: found {stored.shape} voxels (z, y, x), expected {eight_bit.shape} as "
+            "in the source"
         ]
     wrong = int((stored != eight_bit).sum())
     if wrong:
-        problems.append(f"{atlas.name}: {wrong} of {stored.size} voxels are not the source's")
+        problems.append(f"{atlas.name}: {wrong} of {stored.size} voxels differ from the source")
     own = eight_bit[tuple(slice(APRON, APRON + n) for n in task.own_shape)]
     if not task.has_vdb:
         extra = next((file for file in (vdb, composed.measured) if file), None)
         return [*problems, f"{extra.name}: found a field, expected none"] if extra else problems
     if vdb is None:
-        return [*problems, "its volume has no field with a file"]
+        return [*problems, "found no field with a file in its volume, expected one"]
     wanted = None if measured is None else vdb
     if composed.measured != wanted:
         found, expected = (file or "none" for file in (composed.measured, wanted))
@@ -304,7 +309,7 @@ def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTa
         )
         try:
             if vdb.read_bytes() != again.read_bytes():
-                problems.append(f"{vdb.name}: not the file that the source gives")
+                problems.append(f"{vdb.name}: differs from the file that the source gives")
         except OSError as error:
             raise StereoCellError(f"{vdb}: {error.strerror}") from error
     return problems
