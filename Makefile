@@ -187,7 +187,7 @@ view: setup ## Serve the bundle of OUT on this machine and open a browser
 serve: setup ## Serve OUT and stream the voxels that the viewer looks at:  OUT=... [ARGS=--lan]
 	$(WITH_ARGS) $(RUN) serve ARGS -- "$$OUT"
 
-lint: $(READY) $(VIEWER_READY) ## Check style, types, imports between packages and versions of steps: ruff, mypy, biome, tsc
+lint: $(READY) $(VIEWER_READY) ## Check style, types, imports between packages, versions of steps and plain English: ruff, mypy, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
 	@# Files opened without an encoding use the system's, which is not UTF-8 on Windows.
 	$(BIN)/ruff check --quiet --preview --select PLW1514 pipeline
@@ -195,6 +195,7 @@ lint: $(READY) $(VIEWER_READY) ## Check style, types, imports between packages a
 	$(BIN)/mypy
 	PYTHONPATH=pipeline $(BIN)/lint-imports --no-cache --no-logo
 	$(SUPPORT).step_record
+	$(SUPPORT).prose
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
 
 record-steps: $(READY) ## Record the code that each step uses, after you have decided whether its VERSION changes

@@ -61,10 +61,9 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "input",
         type=_named,
-        help="path of a volume: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of "
-        "planes (TIFF, PNG, JPEG, BMP), Imaris, HDF5 (FILE.h5:/KEY), netCDF, MATLAB 7.3, NRRD, "
-        "MRC, MGH, CZI and others (docs/input-formats.md); addresses (http, https, s3) of "
-        "OME-Zarr, TIFF and N5 too",
+        help="path of a volume: OME-Zarr, TIFF, DICOM, NIfTI, a folder of planes (TIFF, PNG, ...), "
+        "Imaris, HDF5 (FILE.h5:/KEY), netCDF, MATLAB 7.3, NRRD, MRC, MGH, CZI and others "
+        "(docs/input-formats.md); or an address (http, https, s3) of OME-Zarr, TIFF or N5",
     )
     declare_how_to_read(parser)
 
