@@ -64,7 +64,7 @@ def test_a_page_that_was_opened_before_follows_the_build_to_its_bundle(
         with watch(client, item) as socket:
             assert until(socket, "unbuilt")["may_control"] is True
             client.command(item, "build")
-            assert until(socket, "building")["folder"] == folder  # the view stays as it is
+            assert until(socket, "building")["folder"] == folder  # the preview is still served
             assert client.ask("GET", f"{view}/{folder}manifest.json")[1] == first
             socket.send("pause")
             until(socket, "paused")

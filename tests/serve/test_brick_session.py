@@ -273,7 +273,7 @@ def test_cancel_of_another_view_does_nothing(port):
         assert t.until("done")["reason"] == "complete"
 
 
-def test_a_client_that_stalls_holds_up_nobody(port):
+def test_a_client_that_stalls_holds_up_no_other_client(port):
     with talk(port, {**HELLO, "window": 65536}) as stalled, talk(port) as other:
         stalled.open(NOISE)
         stalled.acks = False
@@ -283,7 +283,7 @@ def test_a_client_that_stalls_holds_up_nobody(port):
         assert other.until("done")["reason"] == "complete"
 
 
-def test_building_a_tree_holds_up_nobody(port, monkeypatch):
+def test_building_the_brick_tree_of_a_volume_holds_up_no_other_client(port, monkeypatch):
     go_on = Event()
 
     def build(*arguments):
@@ -302,7 +302,7 @@ def test_building_a_tree_holds_up_nobody(port, monkeypatch):
         assert waiting.until("tree")["channel"] == hoechst["channel"]
 
 
-def test_a_second_visit_costs_no_bytes(port):
+def test_a_second_visit_loads_no_bytes_again(port):
     with talk(port) as t:
         tree = t.open()
         t.look()

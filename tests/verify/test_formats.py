@@ -373,7 +373,8 @@ def test_parts_of_a_column_that_are_others_than_stated_are_named(cells):
     assert lines(cells)["object tables"].ok
     column["parts"] = ["0" * 64]
     path.write_text(json.dumps(content))
-    assert "2_CD8.f32: parts have other SHA-256 than stated" in lines(cells)["object tables"].detail
+    detail = lines(cells)["object tables"].detail
+    assert "2_CD8.f32: its rows have another SHA-256 than `parts` states" in detail
 
 
 def test_a_column_that_is_damaged_is_named(cells):

@@ -259,6 +259,7 @@ def _error(
     z0, y0, x0 = (int(n) * edge for n in place)
     box = volume[z0 : z0 + edge, y0 : y0 + edge, x0 : x0 + edge]
     weights = [upsampling(level, n) for n in box.shape]
+    # The brick's 18 samples along each axis are interpolated at the texels, first along x.
     rows = np.tensordot(brick.astype(np.float32), weights[2], axes=(2, 1))  # (18, 18, x)
     largest, squares = np.float32(0), 0.0
     for z in _slabs(box.shape):

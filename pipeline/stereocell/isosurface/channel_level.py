@@ -378,7 +378,7 @@ class _FieldLevels:
         height = value - level.outside
         low, high = (level.outside + factor * height for factor in NEAR)
         step = (high - low) / _TRIED
-        beyond = 3 * _BLUR  # margin, so that smoothing meets no end within the range
+        beyond = 3 * _BLUR  # steps of margin at both ends, where smoothing is not exact
         edges = low + step * np.arange(-beyond, _TRIED + beyond + 1)
         area, total = (
             ndimage.gaussian_filter1d(

@@ -125,7 +125,12 @@ def write_coarse_tiles(
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """The inputs of a channel's volumes."""
+    """The inputs from which the volumes of a channel are sampled.
+
+    coarse      voxels of the whole specimen at a coarse level
+    appearance  its window becomes 0 to 255
+    holder      pieces, such as a CT's table, that are left out; None: there are none
+    """
 
     channel: Channel
     coarse: CoarseChannel

@@ -155,7 +155,7 @@ def make_tissue(shape: tuple[int, int, int], seed: int) -> CellTissue:
 
 
 def _types(centres: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return the cells' types. They form patches along a smooth field, with some cells mixed in."""
+    """Return the cells' types: patches along a fixed wave in space, mixed a little at random."""
     wave = np.sin(centres @ np.array([0.03, 0.055, 0.04])) + np.cos(centres[:, 2] * 0.05)
     rank = np.argsort(np.argsort(wave + rng.normal(0, 0.35, len(centres)))) / len(centres)
     return np.searchsorted(np.cumsum(_SHARES)[:-1], rank, side="right")

@@ -122,7 +122,8 @@ def opening_cut_of(stage: Usd.Stage) -> tuple[Point, float] | None:
     length = float(np.linalg.norm(normal))
     if not 0 < length < FARTHEST_UM or not abs(offset) < FARTHEST_UM * length:
         raise StageError(
-            f"{root.GetPath()}.{OPENING_CUT}: found {normal}, {offset:g}, expected a plane"
+            f"{root.GetPath()}.{OPENING_CUT}: found the normal {normal} and the offset {offset:g}, "
+            f"expected a plane: a normal other than 0, and at most {FARTHEST_UM:g} um away"
         )
     x, y, z = (float(part) for part in np.round(np.array(normal) / length, _SIDE_DIGITS) + 0.0)
     return (x, y, z), offset / length

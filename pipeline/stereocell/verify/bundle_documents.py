@@ -151,7 +151,7 @@ def check_objects(bundle: Path) -> str:
             if ref["bytes"] != count * width
         ]
         problems += [
-            f"{name}: {column['exact']['path']}: parts have other SHA-256 than stated"
+            f"{name}: {column['exact']['path']}: its rows have another SHA-256 than `parts` states"
             for column in content["columns"]
             if "parts" in column and not _has_parts(bundle / column["exact"]["path"], column)
         ]

@@ -111,8 +111,8 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
             worst[level] = max(worst[level], bias)
             if bias > own.bias[level] + _CLOSE:
                 problems.append(
-                    f"{tile.id}/{labels.id}: lod{level}: an object's volume is {bias:.2%} from its "
-                    f"voxels', {own.bias[level]:.2%} is stated"
+                    f"{tile.id}/{labels.id}: lod{level}: an object's volume differs from that of "
+                    f"its voxels by {bias:.2%}, expected at most {own.bias[level]:.2%} as recorded"
                 )
     raise_on(problems)
     biases = ", ".join(f"{share:.2%}" for share in worst)

@@ -45,10 +45,12 @@ export type Drawn = Readonly<{
   solids: number;
 }>;
 
-/** Pixels of the volumes per pixel of the frame, 0 to 1, and traced samples per pixel. */
+/** The quality of one frame. */
 export type FramePace = Readonly<{
+  /** Pixels of the volumes per pixel of the frame, 0 to 1. */
   resolution: number;
   isMoving: boolean;
+  /** Traced samples per pixel. */
   passes: number;
   /**
    * Whether edges are anti-aliased, which takes a third of a frame of surfaces on a software
@@ -138,7 +140,7 @@ export class FrameRenderer {
    *
    * @param head its pose in the scene
    * @param clip the clip planes and box
-   * @param pace how much the frame's budget allows
+   * @param pace the quality that the time for a frame allows
    */
   draw(
     head: Matrix4,

@@ -17,8 +17,8 @@ export type ObjectView = Readonly<{
   /** Bytes at which the palette begins and ends. */
   span: readonly [number, number];
   /**
-   * Whether the palette is spread over the logarithm of the values; null: as the column's bytes
-   * are.
+   * Whether the palette is spread over the logarithm of the values; null: as the bytes of the
+   * column are.
    */
   isLog: boolean | null;
   /**
@@ -74,10 +74,10 @@ export const START_OBJECTS: ObjectView = {
   linked: "",
 };
 
-/** Views by channel; a channel without an entry has START_OBJECTS. */
+/** How each channel's objects are shown, by channel; one without an entry has START_OBJECTS. */
 export type ObjectViews = Readonly<Record<string, ObjectView>>;
 
-/** Changes some fields of the view of a channel. */
+/** Changes how a channel's objects are shown; absent fields stay. */
 export type ObjectChange = Readonly<{
   type: "objects";
   channel: string;

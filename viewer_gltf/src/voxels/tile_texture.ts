@@ -23,10 +23,11 @@ export type Packed = Readonly<{
 }>;
 
 export class TileTexture {
+  /** The newest texture; null until the first one is loaded. */
   shown: Packed | null = null;
   /** The texture that `shown` replaces, while it fades in. */
   old: Packed | null = null;
-  /** Share of `shown`, 0 to 1. */
+  /** Weight of `shown` while it fades in over `old`, 0 to 1; 1 when the fade is over. */
   fresh = 1;
   isLoading = false;
 

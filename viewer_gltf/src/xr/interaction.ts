@@ -64,7 +64,7 @@ export class Hands {
   private taps: number[] = [];
   private isRunning = false;
   private readonly lastChoice = new LastChoice();
-  /** State at the moment when the specimen was picked up with the bar. */
+  /** Pose and gaze at the moment when the bar's button picked up the specimen. */
   private barHold: HeadHold | null = null;
   private state: ViewerState | null = null;
 
@@ -293,7 +293,7 @@ export class Hands {
     this.mover.jumpTo(before.pose, this.gaze.origin);
   }
 
-  /** Picks up the specimen with the bar, then moves it with the gaze until the gaze rests. */
+  /** Picks up the specimen after the bar's button, then moves it with the gaze until the gaze rests. */
   private carrySpecimen(gaze: SceneRay, isStart: boolean): void {
     if (isStart && this.state !== null) {
       this.barHold = this.mover.holdBy(gaze, this.state);

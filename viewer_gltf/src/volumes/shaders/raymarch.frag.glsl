@@ -107,9 +107,9 @@ layout(location = 1) out vec4 oBehind;  // behind the pane
 const float NOWHERE = 1e30;
 
 #ifdef SUM
-// Light of opaque matter over the mean edge of all marched tiles. Screens show thin and thick
-// structures: a tenth of the light looks a third as bright, and few specimens are more than half
-// full.
+// Light that a ray collects in opaque matter as long as the mean edge of the box around all tiles; 1
+// is white. The value is above 1, because few specimens are more than half full. Thin structures
+// stay visible beside thick ones: on a screen, a tenth of the light looks a third as bright.
 const float SUM_LIGHT = 4.0;
 #endif
 #ifdef MAXIMUM
