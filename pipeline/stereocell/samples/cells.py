@@ -67,7 +67,7 @@ class CellTissue:
     labels   uint32 (z, y, x), 1 to n; 0 between cells
     centres  float64 (n, 3), um, (z, y, x)
     types    int64 (n,), indices in TYPES
-    levels   float64 (n, markers), from 0; 1 is a channel's full brightness
+    levels   float64 (n, markers), brightness of each marker, from 0; 1 is the channel's full one
     """
 
     labels: NDArray[np.uint32]

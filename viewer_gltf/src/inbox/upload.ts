@@ -181,7 +181,7 @@ export class Upload {
     this.pieceBytes = Math.max(LEAST_BYTES, Math.round(wanted));
   }
 
-  /** The server has got to there: it answers again. */
+  /** Notes the number of bytes that the server has: it answers again. */
   private moveTo(offset: number): void {
     this.wait_ms = FIRST_WAIT_MS;
     this.place(offset);

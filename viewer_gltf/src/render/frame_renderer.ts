@@ -106,7 +106,7 @@ export class FrameRenderer {
   private readonly overWithin: Overlay;
   private readonly mixed = new Scene();
   private moved = 0;
-  /** Key of the stand-in march; "" if it must be drawn. */
+  /** Key of the march that stands in for path tracing; "" if it must be drawn. */
   private standInKey = "";
   private readonly point = new Vector3();
   private readonly lamp = new Vector3();
@@ -138,7 +138,7 @@ export class FrameRenderer {
   /**
    * Draws a frame.
    *
-   * @param head its pose in the scene
+   * @param head pose of the head in the scene
    * @param clip the clip planes and box
    * @param pace the quality that the time for a frame allows
    */

@@ -47,7 +47,7 @@ export type ObjectView = Readonly<{
   scatter: readonly [string, string];
   /** Points of the lasso in the scatter plot, as shares of its width and height. */
   lasso: readonly (readonly [number, number])[];
-  /** The setting as a link has it, until the table is loaded. */
+  /** These settings as a link states them, until the table is loaded. */
   linked: string;
 }>;
 

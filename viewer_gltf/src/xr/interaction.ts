@@ -177,7 +177,7 @@ export class Hands {
 
   /**
    * Presses the only button of the split screen, or the key that stands for it.
-   * @param time_ms on the clock of events
+   * @param time_ms time of the press, on the clock of DOM events
    */
   tap(time_ms = this.now_ms()): void {
     this.taps.push(time_ms);
