@@ -51,8 +51,8 @@ def test_the_report_and_the_deep_check_describe_objects(
     layer.Save()
     assert run("check", out, "--deep", "--workers", 0) == 1
     first = labels_of(out)[objects_of(out)["tiles"]["r0_c0"]["first"]]
-    wanted = f"FAIL cells against source: r0_c0/cells: column area_um2 has other values of {first}"
-    assert wanted in said(capsys)
+    line = "FAIL cells against source: r0_c0/cells: column area_um2 differs from the table"
+    assert f"{line} for the objects {first}" in said(capsys)
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_the_deep_check_measures_the_image_again(
     said(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
     output = said(capsys)  # on the last object of each tile
-    assert f"cells: column {measure_of}_DNA is not the voxels' {measure_of} of 3, 8" in output
+    assert f"cells: column {measure_of}_DNA differs from the voxels' {measure_of} of 3, 8" in output
     assert output.count("voxels'") == 1
 
 
@@ -122,7 +122,7 @@ def test_the_deep_check_measures_the_surfaces_again(
     build(tmp_path / "l.ome.tif", tmp_path / "wrong", "--labels", ".")
     said(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
-    assert "column area_um2 is not that of the surface of 3" in said(capsys)
+    assert "column area_um2 differs from the surfaces of the objects 3" in said(capsys)
 
 
 @pytest.mark.slow
@@ -166,7 +166,7 @@ def test_the_deep_check_measures_the_interfaces_again(
     odd = {
         column
         for column in ("neighbours", "contact")
-        if f"column {column} is not that of the surface of" in output
+        if f"column {column} differs from the surfaces of" in output
     }
     assert (
         odd

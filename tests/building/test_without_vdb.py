@@ -61,7 +61,7 @@ def test_a_deep_check_passes_and_still_compares_the_voxels(
     voxels[10, 10, 10] ^= 1
     write_atlas(atlas, voxels)
     assert main(["check", str(out), "--deep"]) == 1
-    assert "1 of 17576 voxels are not the source's" in capsys.readouterr().out
+    assert "1 of 17576 voxels differ from the source's" in capsys.readouterr().out
 
 
 def test_a_new_window_is_applied_to_the_voxels_of_eight_bits(tmp_path: Path) -> None:

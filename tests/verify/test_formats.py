@@ -199,7 +199,7 @@ def test_level_that_lies_elsewhere_is_found(out):
     offset = text.split('"offset":')[1].split(",")[0]
     path.write_text(text.replace(f'"offset":{offset}', f'"offset":{int(offset) + 1}', 1))
     found = lines(out)
-    assert "lie elsewhere" in found["volume lists"].detail
+    assert "lie at other bytes than stated" in found["volume lists"].detail
 
 
 def test_tileset_whose_errors_grow_is_found(out):
@@ -361,7 +361,7 @@ def test_a_table_that_is_too_short_and_rows_that_are_not_there_are_named(cells):
     path.write_text(json.dumps(content))
     detail = lines(cells)["object tables"].detail
     assert "0_volume_um3.u8 has 60 bytes, expected 61" in detail
-    assert "r0_c1: names rows beyond the 61" in detail
+    assert "r0_c1: names rows beyond the table's 61" in detail
 
 
 def test_parts_of_a_column_that_are_others_than_stated_are_named(cells):

@@ -49,7 +49,9 @@ def check_volume_lists(bundle: Path) -> str:
             texture = bundle / volume["file"]["path"]
             listed = [(level["offset"], level["length"]) for level in volume["levels"]]
             if _levels_of(texture, len(listed)) != listed:
-                problems.append(f"{path}: the levels of {volume['file']['path']} lie elsewhere")
+                problems.append(
+                    f"{path}: the levels of {volume['file']['path']} lie at other bytes than stated"
+                )
                 continue
             problems += _damaged_levels(texture, volume)
     raise_on(problems)
@@ -157,7 +159,7 @@ def check_objects(bundle: Path) -> str:
         ]
         for tile, rows in content["tiles"].items():
             if max([rows["first"] + rows["count"] - 1, *rows.get("more", [])]) >= max(count, 1):
-                problems.append(f"{name}: {tile}: names rows beyond the {count} that there are")
+                problems.append(f"{name}: {tile}: names rows beyond the table's {count}")
     raise_on(problems)
     return f"{objects} objects"
 

@@ -132,7 +132,7 @@ def _compare_boxes(
             lacks = max((centre - reach - low).max(), (high - centre - reach).max())
             exceeds = max((low - centre + reach).max(), (centre + reach - high).max())
             if lacks > slack or (k == 0 and exceeds > slack):
-                yield f"lod{level}: a box of the tileset is not round the surfaces: {list(box)}"
+                yield f"lod{level}: a box of the tileset doesn't enclose the surfaces: {list(box)}"
                 break
 
 
@@ -151,7 +151,7 @@ def _compare_surface(
         lod = replace(lod, mesh=with_vertex_occlusion(lod))
     triangles = lod.mesh.triangles
     if len(drawn.triangles) != len(triangles):
-        return 0.0, [f"{len(drawn.triangles)} triangles, the stage has {len(triangles)}"]
+        return 0.0, [f"found {len(drawn.triangles)} triangles, the stage has {len(triangles)}"]
     places = lod.mesh.positions.astype(np.float64) / _UM_PER_METRE
     decoded = drawn.positions_m.astype(np.float64)
     # Half the diagonal of a lattice cell, plus the rounding of a viewer's float32 metres.
@@ -168,7 +168,7 @@ def _compare_surface(
     apart = max(_farthest(places, decoded), _farthest(there.mean(axis=1), here.mean(axis=1)))
     if apart > limit_m:
         problems.append(
-            f"a vertex is {apart * _UM_PER_METRE:.4g} um from its place, the lattice allows "
+            f"a vertex is {apart * _UM_PER_METRE:.4g} um from its place, rounding allows "
             f"{limit_m * _UM_PER_METRE:.4g}"
         )
     else:
@@ -192,7 +192,7 @@ def _compare_surface(
         off = np.abs(drawn.paint[np.asarray(nearest)] - np.clip(lod.mesh.paint, 0, 1))
         if np.mean(off > COLOR_STEP) > _ODD_SHARE:
             problems.append(
-                f"{np.mean(off > COLOR_STEP):.0%} of its vertices are painted otherwise"
+                f"{np.mean(off > COLOR_STEP):.0%} of its vertices are painted in other colours"
             )
     return apart / drawn.step_m, problems
 
@@ -228,7 +228,7 @@ def _compare_faces(
         yield (
             "its vertices have colours, the stage's none"
             if dimmed is None
-            else ("the occlusion at its vertices is lost")
+            else ("the occlusion at its vertices is missing")
         )
     elif dimmed is not None and drawn.colors is not None:
         off = np.abs(dimmed[triangles].mean(axis=1) - drawn.colors[here_of].mean(axis=1))
@@ -287,12 +287,12 @@ def _compare_vertex_colors(
     if mesh.colors is None:
         return
     if drawn.colors is None:
-        yield "the mesh's own colours are lost"
+        yield "the mesh's own colours are missing"
         return
     _, nearest = cKDTree(decoded).query(places)
     dimmed = np.asarray(drawn.colors[np.asarray(nearest)])  # occlusion may have dimmed the colours
     if float((dimmed - np.clip(mesh.colors, 0, 1)).max()) > 2 * COLOR_STEP:
-        yield "the mesh's own colours are others"
+        yield "the mesh's own colours differ from the stage's"
 
 
 def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterator[str]:
@@ -301,7 +301,7 @@ def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterat
         named = path.name if isinstance(path, Path) else f"lod{lod.level}_{kind}"
         if path is None or (is_last and kind != "color" and name not in drawn.maps):
             if path is None and name in drawn.maps:
-                yield f"a map ({kind}) that the stage has not"
+                yield f"found a map ({kind}), the stage has none"
             continue  # the coarsest level needs no maps
         if name not in drawn.maps:
             yield f"the map {named} is missing"
@@ -311,4 +311,4 @@ def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterat
             continue
         found, wanted = (decode_map(map_).astype(np.float64) for map_ in (drawn.maps[name], again))
         if found.shape != wanted.shape or np.abs(found - wanted).mean() > _MAP_DIFFERENCE:
-            yield f"the map {named} is another image in the stage"
+            yield f"the map {named} differs from the stage's image"

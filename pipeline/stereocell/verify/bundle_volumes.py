@@ -35,13 +35,13 @@ def compare_volume(bundle: Path, entry: dict[str, Any], voxels: NDArray[np.uint8
     file = bundle / entry["file"]["path"]
     found, expected = read_texels(file), mip_levels(voxels)
     if [level.shape[:3] for level in found] != [level.shape for level in expected]:
-        yield f"{file.name}: its levels have other sizes than the stage's volume gives"
+        yield f"{file.name}: its mip levels have other sizes than those of the stage's volume"
         return
     for k, (level, wanted) in enumerate(zip(found, expected, strict=True)):
         wrong = int((level[..., 0] != wanted).sum())
         if wrong:
-            yield f"{file.name}: level {k}: {wrong} of {wanted.size} voxels are not the stage's"
+            yield f"{file.name}: level {k}: {wrong} of {wanted.size} voxels differ from the stage's"
     file = bundle / entry["bricks"]["path"]
     (bricks,), ends = read_texels(file), min_max_bricks(voxels)
     if bricks.shape != ends.shape or (bricks != ends).any():
-        yield f"{file.name}: not the least and most of the stage's bricks"
+        yield f"{file.name}: the extremes of its bricks differ from those of the stage's volume"

@@ -169,7 +169,7 @@ def _odd_walls(
         off = np.abs(known["contact"][rows] - share) > most
         odd["contact"] += names[off & ~np.isin(names, cut)].tolist()
     return [
-        f"{labels.id}: column {column} is not that of the surface of {_shown(found)}"
+        f"{labels.id}: column {column} differs from the surfaces of the objects {_shown(found)}"
         for column, found in odd.items()
         if found
     ]
@@ -214,7 +214,7 @@ def _odd_intensities(
             if not right.all():
                 shown = _shown(names[~right].tolist())
                 problems.append(
-                    f"{labels.id}: column {column.id} is not the voxels' {kind} of {shown}"
+                    f"{labels.id}: column {column.id} differs from the voxels' {kind} of {shown}"
                 )
     return problems
 
@@ -253,7 +253,8 @@ def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
         return [f"the stage has no objects, expected {len(own.labels)}"] if len(own.labels) else []
     if there.labels.tolist() != own.labels.tolist():
         return [
-            f"the stage has {len(there.labels)} objects, others than the {len(own.labels)} found"
+            f"the stage has {len(there.labels)} objects, expected the "
+            f"{len(own.labels)} of the label map"
         ]
     found = []
     for column in own.columns:
@@ -264,7 +265,7 @@ def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
         same = np.isclose(values, column.values, rtol=1e-5, atol=1e-6, equal_nan=True)
         if not same.all():
             shown = ", ".join(map(str, own.labels[~same][:_SHOWN].tolist()))
-            found.append(f"column {column.id} has other values of {shown}")
+            found.append(f"column {column.id} differs from the table for the objects {shown}")
     return found
 
 
@@ -290,7 +291,7 @@ def _odd_areas(
     for column, odd in (("area_um2", off & whole), ("sphericity", uneven & (stated > 0))):
         if odd.any():
             shown = ", ".join(map(str, there.labels[odd][:_SHOWN].tolist()))
-            found.append(f"column {column} is not that of the surface of {shown}")
+            found.append(f"column {column} differs from the surfaces of the objects {shown}")
     return found
 
 

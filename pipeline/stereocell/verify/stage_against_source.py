@@ -103,7 +103,7 @@ def compare_unit(task: SourceTask) -> UnitFinding:
         composed = read_volume(tile, task.channel_id)
         record = load_record(task.directory)
         if cover_of(record) != cover:
-            problems.append("the share of the source's voxels that it covers is not as recorded")
+            problems.append("the surface covers another share of the voxels than was recorded")
         surfaces = _Surfaces(fine, given, task.placement, task.samples)
         levels, faults = _compare_lods(surfaces, lods, record)
         problems += faults
@@ -162,7 +162,7 @@ def _compare_lods(
         return (), ["the source has no surface, the stage has one"] if lods else []
     problems = []
     if len(lods) < len(record["lods"]):
-        problems.append(f"{len(lods)} levels of detail, {len(record['lods'])} were built")
+        problems.append(f"found {len(lods)} levels of detail, {len(record['lods'])} were built")
     levels = []
     for lod in lods:
         to_fine = surfaces.at(lod.level)
@@ -179,7 +179,8 @@ def _compare_lods(
             )
         if largest > _slack(lod.largest_um):
             problems.append(
-                f"{name}: up to {largest:.4g} um away, the stage states {lod.largest_um:.4g}"
+                f"{name}: up to {largest:.4g} um from the iso-surface, the stage states "
+                f"{lod.largest_um:.4g}"
             )
         if _facing(lod.mesh, to_fine) < 0:
             problems.append(f"{name}: its triangles face inwards")
@@ -187,7 +188,9 @@ def _compare_lods(
         most_um = max(stored["distance_um"], quality.away.max, quality.back.max)
         for stated, built in ((lod.distance_um, stored["distance_um"]), (lod.largest_um, most_um)):
             if abs(stated - built) > _HAIR_UM + 1e-5 * built:
-                problems.append(f"{name}: the stage states {stated:.4g} um, the unit {built:.4g}")
+                problems.append(
+                    f"{name}: the stage states a distance of {stated:.4g} um, the unit {built:.4g}"
+                )
     return tuple(levels), problems
 
 
@@ -283,7 +286,7 @@ def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTa
         ]
     wrong = int((stored != eight_bit).sum())
     if wrong:
-        problems.append(f"{atlas.name}: {wrong} of {stored.size} voxels are not the source's")
+        problems.append(f"{atlas.name}: {wrong} of {stored.size} voxels differ from the source's")
     own = eight_bit[tuple(slice(APRON, APRON + n) for n in task.own_shape)]
     if not task.has_vdb:
         extra = next((file for file in (vdb, composed.measured) if file), None)
@@ -306,7 +309,7 @@ def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTa
         )
         try:
             if vdb.read_bytes() != again.read_bytes():
-                problems.append(f"{vdb.name}: not the file that the source gives")
+                problems.append(f"{vdb.name}: differs from the file that the source gives")
         except OSError as error:
             raise StereoCellError(f"{vdb}: {error.strerror}") from error
     return problems
