@@ -94,7 +94,9 @@ def test_coarser_levels_are_made_again_from_an_edited_finest_level(bundle, edit)
     assert stated["lod1"] != errors_um(bundle)["lod1"]
     other = "channels/CD31/r0_c1/lod1.glb"
     (line,) = edit.told
-    assert line.startswith("r0_c0/CD31: edited by hand: lod0 (sound); made anew from lod0: lod1 ")
+    assert line.startswith(
+        "r0_c0/CD31: edited by hand: lod0 (sound); simplified again from lod0: lod1 "
+    )
     assert "lod2 within" in line
     assert read((edited / other).read_bytes())[0]["meshes"]  # the neighbour is not touched
     assert chain(edited, "r0_c1") == chain(bundle, "r0_c1")
@@ -237,7 +239,7 @@ def test_a_transform_of_the_finest_level_alone_is_an_edit(edit):
     )
     for level in ("lod0", "lod1", "lod2"):
         assert np.abs(radii(edited, level, (-1, 2, 0.5)) - spheres.RADIUS).max() < RISE
-    assert "made anew from lod0: lod1" in edit.told[0]
+    assert "simplified again from lod0: lod1" in edit.told[0]
 
 
 @pytest.mark.slow
@@ -252,7 +254,7 @@ def test_edit_in_place_and_flattened_edit_are_recognised(stage, edit, tmp_path):
     own.GetRootLayer().Save()
     told = write(tmp_path / "own/stage.usda", tmp_path / "a")
     (line,) = told
-    assert "lod0 (sound); made anew from lod0: lod1" in line
+    assert "lod0 (sound); simplified again from lod0: lod1" in line
     assert np.abs(radii(tmp_path / "a", "lod2") - 1.25 * spheres.RADIUS).max() < RISE
 
     edit(lambda s: in_level(s, "lod0", swell(1.25)))
@@ -324,7 +326,7 @@ def test_remade_levels_have_occlusion_and_paint_of_the_edited_level(tmp_path, fi
     )
     told = write(path, tmp_path / "bundle")
     (line,) = told
-    assert "made anew from lod0: lod1" in line
+    assert "simplified again from lod0: lod1" in line
     with loaded(open_stage(tmp_path / "edit.usda"), "r0_c0") as (prim, _):
         _, lod, _ = shown_lods(prim, "CD31").lods
     assert lod.material.color == (1, 1, 1)

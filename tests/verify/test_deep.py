@@ -476,7 +476,7 @@ def test_a_bundle_of_an_edited_mesh_is_compared_with_the_edited_mesh(
     stage.GetRootLayer().Save()
     told = ["--stage", str(layer)]
     assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
-    edit = "r0_c0/F: edited by hand: lod0 (sound); made anew from lod0: lod1 within "
+    edit = "r0_c0/F: edited by hand: lod0 (sound); simplified again from lod0: lod1 within "
     assert f"bundle: {edit}" in capsys.readouterr().err
     assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
     assert edit in capsys.readouterr().out

@@ -170,7 +170,7 @@ def _follow(
             anew.append(f"lod{lod.level}{found} within {lod.distance_um:.3g} um")
         result.append(lod)
     if anew:
-        remarks.append(f"made anew from lod{fine.level}: {', '.join(anew)}")
+        remarks.append(f"simplified again from lod{fine.level}: {', '.join(anew)}")
     return result, remarks
 
 
