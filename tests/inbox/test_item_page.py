@@ -64,7 +64,7 @@ def test_a_page_that_was_opened_before_follows_the_build_to_its_bundle(
         with watch(client, item) as socket:
             assert until(socket, "unbuilt")["may_control"] is True
             client.command(item, "build")
-            assert until(socket, "building")["folder"] == folder  # the view stays as it is
+            assert until(socket, "building")["folder"] == folder  # the preview is still served
             assert client.ask("GET", f"{view}/{folder}manifest.json")[1] == first
             socket.send("pause")
             until(socket, "paused")
@@ -106,7 +106,7 @@ def test_a_page_waits_for_the_builds_before_its_own_and_may_leave_the_queue(
             until(socket, "building")
 
 
-def test_a_look_after_a_choice_is_a_new_view_and_the_older_one_stays_for_pages_that_show_it(
+def test_a_preview_after_a_choice_is_new_and_the_older_one_stays_for_pages_that_show_it(
     tmp_path: Path, head: bytes
 ) -> None:
     with serving_inbox(tmp_path, FakeBuilds()) as server:
@@ -141,14 +141,14 @@ def test_the_page_of_a_deleted_item_receives_that_state(tmp_path: Path, head: by
             assert until(socket, "deleted")["may_control"] is False
 
 
-def test_a_session_that_may_only_look_sees_the_build_and_can_not_command_it(
+def test_a_client_that_may_only_view_sees_the_build_and_cannot_control_it(
     tmp_path: Path, head: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with serving_inbox(tmp_path, FakeBuilds()) as server:
         client = InboxClient(server.port)
         item = hand_in(client, head)
         monkeypatch.setattr(inbox_app, "MAY_UPLOAD", "another right")
-        with watch(client, item) as socket:  # nothing is to be looked at yet
+        with watch(client, item) as socket:  # there is no preview yet
             until(socket, "deleted")
         monkeypatch.undo()
         client.command(item, "look")
@@ -167,7 +167,7 @@ def test_a_session_that_may_only_look_sees_the_build_and_can_not_command_it(
 
 
 def look(client: InboxClient, item: str) -> tuple[dict[str, Any], str, dict[str, str]]:
-    """Return the manifest of an item's look, the path of its bricks, and its first volume."""
+    """Return the manifest of an item's preview, the path of its bricks, and its first volume."""
     client.command(item, "look")
     _, manifest, headers = client.ask("GET", f"/items/{item}/view/manifest.json")
     assert headers["Stereocell-Bricks"] == headers["Stereocell-Live"]
@@ -175,7 +175,7 @@ def look(client: InboxClient, item: str) -> tuple[dict[str, Any], str, dict[str,
     return manifest, f"/items/{item}/view/{folder_in(headers)}bricks", volume
 
 
-def test_a_tile_that_is_looked_at_gets_the_voxels_of_the_upload_before_any_build(
+def test_a_tile_in_the_view_gets_the_voxels_of_the_upload_before_any_build(
     tmp_path: Path, head: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(first_view, "VOXELS", 10_000)
@@ -197,7 +197,7 @@ def test_a_tile_that_is_looked_at_gets_the_voxels_of_the_upload_before_any_build
         np.testing.assert_allclose(shown, known, atol=0.51)
 
 
-def test_an_upload_that_is_damaged_after_the_look_is_an_error_without_its_name(
+def test_an_upload_that_is_damaged_after_the_preview_gives_an_error_without_its_name(
     tmp_path: Path, head: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(first_view, "VOXELS", 10_000)

@@ -119,7 +119,7 @@ def test_skew_axes_are_resampled_onto_an_orthogonal_grid(tmp_path: Path) -> None
 
 
 def test_nan_is_read_as_the_smallest_finite_value_and_is_noted(tmp_path: Path) -> None:
-    """An extracted brain is surrounded by NaN."""
+    """Some programs that cut the brain out of a head write NaN around it, like the rows here."""
     values = sample(grid(), SHAPE).astype(np.float32) + 7
     bare = values.copy()
     bare[:, :5] = np.nan

@@ -173,7 +173,9 @@ def with_level(source: Path, path: str) -> Path:
     return source
 
 
-def test_slices_by_links_out_of_the_folder_are_refused_without_their_names(home: Path) -> None:
+def test_slices_by_symbolic_links_out_of_the_folder_are_refused_without_their_names(
+    home: Path,
+) -> None:
     paths = sorted(write_series(home / "s", grid(shape=SHAPE), SHAPE))
     bait = paths[2].rename(home / "Doe^Jane.dcm")
     paths[2].symlink_to(bait)
@@ -183,7 +185,7 @@ def test_slices_by_links_out_of_the_folder_are_refused_without_their_names(home:
     assert paths[2].name not in line
 
 
-def test_slices_by_links_within_the_folder_are_read(home: Path) -> None:
+def test_slices_by_symbolic_links_within_the_folder_are_read(home: Path) -> None:
     paths = sorted(write_series(home / "s", grid(shape=SHAPE), SHAPE))
     (home / "s" / "annex").mkdir()
     for path in paths:

@@ -97,7 +97,7 @@ def talk(port, hello=HELLO):
         yield talking
 
 
-def test_a_view_of_all_brings_the_volume(port):
+def test_a_view_of_the_whole_volume_gets_all_its_bricks(port):
     with talk(port) as t:
         tree = t.open()
         t.look()
@@ -127,7 +127,7 @@ def test_the_picture_gets_better_with_every_part_of_the_bytes(port):
         assert curve[-1] > 60
 
 
-def test_bricks_come_parents_first(port):
+def test_a_brick_is_sent_after_its_coarser_parent(port):
     with talk(port) as t:
         tree = t.open()
         t.look()
@@ -143,7 +143,7 @@ def test_bricks_come_parents_first(port):
         assert len(set(nodes)) == len(nodes)
 
 
-def test_the_budget_is_kept_and_the_next_view_goes_on(port):
+def test_a_view_stays_within_its_budget_and_the_next_view_continues(port):
     with talk(port) as t:
         tree = t.open()
         total = t.client.trees[tree].table.brick_bytes
@@ -155,7 +155,7 @@ def test_the_budget_is_kept_and_the_next_view_goes_on(port):
             assert 10_000 < done["bytes"] == t.client.brick_bytes - before <= 20_000
         t.look(3)
         assert t.until("done")["reason"] == "complete"
-        assert t.client.brick_bytes == total  # nothing came twice
+        assert t.client.brick_bytes == total  # no brick was sent twice
         t.look(4, budget=0)
         assert t.until("done") | {"view": 0} == {
             **{"type": "done", "view": 0, "reason": "complete"},
@@ -163,7 +163,7 @@ def test_the_budget_is_kept_and_the_next_view_goes_on(port):
         }
 
 
-def test_a_client_that_never_acks_gets_no_more_than_its_window(port):
+def test_a_client_that_acknowledges_nothing_gets_at_most_its_window(port):
     with talk(port, {**HELLO, "window": 65536}) as t:
         t.open(NOISE)
         t.acks = False
@@ -182,7 +182,7 @@ def test_a_client_that_never_acks_gets_no_more_than_its_window(port):
         assert t.client.brick_bytes == before
 
 
-def test_an_ack_lets_as_much_more_come(port):
+def test_an_acknowledgement_lets_the_server_send_as_many_bytes_more(port):
     with talk(port, {**HELLO, "window": 65536}) as t:
         t.open(NOISE)
         t.look(1)
@@ -203,7 +203,7 @@ def test_a_cancelled_view_ends_after_the_frames_that_were_sent(port):
 
 
 def fill(t):
-    """Have all come that comes without an ack."""
+    """Take all messages that the server sends without an acknowledgement."""
     t.acks = False
     with suppress(TimeoutError):
         while True:
@@ -212,7 +212,7 @@ def fill(t):
             t.client.take(data)
 
 
-def test_a_frame_that_waits_for_room_goes_with_its_view(port):
+def test_a_frame_that_waits_for_the_window_is_dropped_with_its_view(port):
     with talk(port, {**HELLO, "window": 65536}) as t:
         t.open(NOISE)
         t.look(1)
@@ -226,7 +226,7 @@ def test_a_frame_that_waits_for_room_goes_with_its_view(port):
         assert (t.frames, done["bytes"]) == (frames, t.client.brick_bytes)
 
 
-def test_bricks_that_a_client_finds_meanwhile_are_left_out(port):
+def test_bricks_that_the_client_then_finds_in_its_cache_are_not_sent(port):
     with talk(port, {**HELLO, "window": 65536}) as t:
         tree = t.open(NOISE)
         t.look(1)
@@ -240,7 +240,7 @@ def test_bricks_that_a_client_finds_meanwhile_are_left_out(port):
         assert t.client.brick_bytes < 2 * 65536  # the frames that were already sent, and one more
 
 
-def test_a_full_window_without_an_ack_is_closed_in_the_end(port, monkeypatch):
+def test_a_connection_closes_after_a_full_window_without_an_acknowledgement(port, monkeypatch):
     monkeypatch.setattr(frame_window, "ACK_S", 0.1)
     with talk(port, {**HELLO, "window": 65536}) as t:
         t.open(NOISE)
@@ -249,7 +249,7 @@ def test_a_full_window_without_an_ack_is_closed_in_the_end(port, monkeypatch):
         assert t.closed() == (1008, "no ack within 0.1 s")
 
 
-def test_a_new_view_ends_the_one_before(port):
+def test_a_new_view_ends_the_view_before_it(port):
     with talk(port, {**HELLO, "window": 65536}) as t:
         t.open(NOISE)
         for id in (1, 2, 3):
@@ -265,7 +265,7 @@ def test_a_new_view_ends_the_one_before(port):
         assert sum(d["bytes"] for d in t.client.done.values()) == t.client.brick_bytes
 
 
-def test_cancel_of_another_view_does_nothing(port):
+def test_cancelling_another_view_does_nothing(port):
     with talk(port) as t:
         t.open()
         t.look(5)
@@ -273,7 +273,7 @@ def test_cancel_of_another_view_does_nothing(port):
         assert t.until("done")["reason"] == "complete"
 
 
-def test_a_client_that_stalls_holds_up_nobody(port):
+def test_a_client_that_stalls_holds_up_no_other_client(port):
     with talk(port, {**HELLO, "window": 65536}) as stalled, talk(port) as other:
         stalled.open(NOISE)
         stalled.acks = False
@@ -283,7 +283,7 @@ def test_a_client_that_stalls_holds_up_nobody(port):
         assert other.until("done")["reason"] == "complete"
 
 
-def test_building_a_tree_holds_up_nobody(port, monkeypatch):
+def test_building_the_brick_tree_of_a_volume_holds_up_no_other_client(port, monkeypatch):
     go_on = Event()
 
     def build(*arguments):
@@ -302,7 +302,7 @@ def test_building_a_tree_holds_up_nobody(port, monkeypatch):
         assert waiting.until("tree")["channel"] == hoechst["channel"]
 
 
-def test_a_second_visit_costs_no_bytes(port):
+def test_a_second_visit_loads_no_bytes_again(port):
     with talk(port) as t:
         tree = t.open()
         t.look()
@@ -320,7 +320,7 @@ def test_a_second_visit_costs_no_bytes(port):
         assert t.frames == t.client.brick_bytes == t.client.table_bytes == 0
 
 
-def test_bricks_that_were_dropped_can_be_had_again(port):
+def test_bricks_that_the_client_dropped_are_sent_again(port):
     with talk(port) as t:
         tree = t.open()
         t.look()
@@ -399,7 +399,9 @@ VIEW = {"type": "view", "id": 1, "trees": [0], "pixels_per_radian": 500, "texel_
         ([HELLO] + [{"type": "cancel", "id": 1}] * 400, 1008, "more than 100 messages a second"),
     ],
 )
-def test_a_client_that_breaks_the_rules_is_closed_with_a_reason(port, messages, code, reason):
+def test_the_connection_of_a_client_that_breaks_the_rules_closes_with_a_reason(
+    port, messages, code, reason
+):
     with talk(port, None) as t:
         with suppress(ConnectionClosed):
             for message in messages:
@@ -409,7 +411,7 @@ def test_a_client_that_breaks_the_rules_is_closed_with_a_reason(port, messages, 
         assert reason in found[1]
 
 
-def test_a_bad_list_of_bricks_is_closed(port):
+def test_a_damaged_list_of_bricks_closes_the_connection(port):
     for nodes, reason in (("!!!!", "have"), ("AAA", "not base64"), ("AAAA", "3 bytes for")):
         with talk(port) as t:
             tree = t.open()
@@ -419,19 +421,19 @@ def test_a_bad_list_of_bricks_is_closed(port):
             assert reason in found
 
 
-def test_binary_frames_are_closed(port):
+def test_a_binary_frame_closes_the_connection(port):
     with talk(port) as t:
         t.socket.send(b"\x01\x02")
         assert t.closed() == (1003, "a client may send text only, not binary frames")
 
 
-def test_silence_is_closed(port, monkeypatch):
+def test_a_silent_client_is_disconnected(port, monkeypatch):
     monkeypatch.setattr(brick_session, "HELLO_S", 0.05)
     with talk(port, None) as t:
         assert t.closed() == (1008, "no hello within 0.05 s")
 
 
-def test_too_many_connections_are_sent_away(port, monkeypatch):
+def test_connections_beyond_the_limit_are_refused(port, monkeypatch):
     monkeypatch.setattr(brick_session, "MAX_CONNECTIONS", 1)
     with talk(port), talk(port, None) as two:
         assert two.closed() == (1013, "1 connections are open, try again later")

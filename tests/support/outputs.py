@@ -25,7 +25,7 @@ class Outputs:
 
 
 def make_source(file: Path, *, lift: int = 0) -> Path:
-    """Write a volume of one channel; another `lift` makes another specimen of it."""
+    """Write a volume of one channel. `lift` is added to all voxels, to make another specimen."""
     voxels = np.asarray(phantoms.f_phantom() + lift)[None]
     return phantoms.write_ome_tiff(file, voxels, "CZYX", names=["F"])
 

@@ -75,7 +75,7 @@ ARRAY = np.arange(4 * 8 * 8, dtype=np.uint16).reshape(4, 8, 8)
 
 
 @pytest.mark.parametrize("name", ["build", "show", "show an array"])
-def test_functions_that_write_keep_foreign_files_and_name_their_argument(
+def test_functions_that_write_keep_foreign_files_and_name_the_argument_that_replaces_them(
     tmp_path: Path, name: str
 ) -> None:
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", phantoms.f_phantom()[None], "CZYX")

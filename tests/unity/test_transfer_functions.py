@@ -49,7 +49,7 @@ def test_functions_survive_points_curves_and_gradients(run: Run) -> None:
         assert np.abs(again - found["row"]).max() <= 1
         assert (again != found["row"]).mean() < 0.02
     assert sizes[:3] == [2, 2, 2]
-    assert sizes[3] <= 5  # four points, one of them between two intensities
+    assert sizes[3] <= 5  # four points; the one at 0.55 lies between two of the 256 intensities
     assert sizes[4] == 6  # a step takes two points
     assert sizes[5] < 30
 

@@ -22,7 +22,8 @@ from stereocell.model.version import GENERATOR
 _IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 _HEADER = struct.Struct("<9I4I2Q")
 _LEVEL = struct.Struct("<3Q")
-_VK_FORMATS = {1: 9, 2: 16, 4: 37}  # components: R8_UNORM, R8G8_UNORM, R8G8B8A8_UNORM
+# Number of components -> Vulkan's format: R8_UNORM, R8G8_UNORM, R8G8B8A8_UNORM
+_VK_FORMATS = {1: 9, 2: 16, 4: 37}
 _COMPONENTS = {vk_format: components for components, vk_format in _VK_FORMATS.items()}
 _CHANNEL_TYPES = (0, 1, 2, 15)  # red, green, blue, alpha
 # Orientation by the number of dimensions: x to the right, y down, z towards the viewer

@@ -140,7 +140,7 @@ class CompressedBuffers:
 
 
 def _offset(start: int) -> dict[str, int]:
-    """Return a bufferView's offset; 0 is its default."""
+    """Return the member byteOffset of a new bufferView; the default, 0, is left out."""
     return {"byteOffset": start} if start else {}
 
 

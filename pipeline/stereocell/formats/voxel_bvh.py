@@ -156,7 +156,7 @@ def upsampling(level: int, count: int) -> Floats:
 
 
 def _make_pyramid(volume: Bytes3) -> list[Bytes3]:
-    """Return the levels, each half as long as the one before; the last one is a single brick."""
+    """Return the mip levels, each half as long as the one before; the last is a single brick."""
     levels = [volume]
     exact: NDArray[np.uint8] | Floats = volume
     while max(levels[-1].shape) > STREAM_BRICK:
@@ -167,7 +167,7 @@ def _make_pyramid(volume: Bytes3) -> list[Bytes3]:
 
 
 def _halve(values: NDArray[np.uint8] | Floats, axis: int) -> Floats:
-    """Return the means of neighbours along an axis. A last one without a neighbour stays.
+    """Return the means of neighbours along an axis. A last value without a neighbour stays.
 
     The means are exact up to level 5: texels of level l are multiples of 1/8^l below 256, which
     float32 represents. At deeper levels the error is below 1e-4.
@@ -259,6 +259,7 @@ def _error(
     z0, y0, x0 = (int(n) * edge for n in place)
     box = volume[z0 : z0 + edge, y0 : y0 + edge, x0 : x0 + edge]
     weights = [upsampling(level, n) for n in box.shape]
+    # The brick's 18 samples along each axis are interpolated at the texels, first along x.
     rows = np.tensordot(brick.astype(np.float32), weights[2], axes=(2, 1))  # (18, 18, x)
     largest, squares = np.float32(0), 0.0
     for z in _slabs(box.shape):

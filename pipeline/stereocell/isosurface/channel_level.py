@@ -152,7 +152,10 @@ class ChannelLevels:
         return max(self.all_levels, key=lambda level: level.confidence).why_unclear
 
     def judge(self, value: float) -> Level:
-        """Return a level that was found by other means, with its measures. value: voxel values."""
+        """Return a level that was found by other means, with its measures.
+
+        value  of the level, in voxel values
+        """
         valleys = self._field.histogram.find_valleys(self.noise)
         dips = [valley.dip for valley in valleys if valley.low <= value <= valley.high]
         return self._field.judge(value, self._field.histogram, min(dips, default=1.0))
@@ -353,7 +356,7 @@ class _FieldLevels:
         return min(max(low, MIN_SHARE * self.histogram.total), high)
 
     def _half_heights(self, rest: LevelHistogram) -> list[Level]:
-        """Return levels at half height. Each is found on the voxels above the one before."""
+        """Return levels at half height. Each is found on the voxels above the level before it."""
         found = []
         for _ in range(HALF_HEIGHTS):
             value = rest.half_height() if rest.total >= self._least_voxels else np.nan
@@ -378,7 +381,7 @@ class _FieldLevels:
         height = value - level.outside
         low, high = (level.outside + factor * height for factor in NEAR)
         step = (high - low) / _TRIED
-        beyond = 3 * _BLUR  # margin, so that smoothing meets no end within the range
+        beyond = 3 * _BLUR  # steps of margin at both ends, where smoothing is not exact
         edges = low + step * np.arange(-beyond, _TRIED + beyond + 1)
         area, total = (
             ndimage.gaussian_filter1d(
@@ -392,7 +395,7 @@ class _FieldLevels:
         return self.judge(float(low + (int(score.argmax()) + 0.5) * step), part, dip)
 
     def _find_dim_bodies(self, part: LevelHistogram) -> list[Level]:
-        """Return the level of dim bodies, if there are any that are too few for a peak."""
+        """Return the level of dim bodies that have too few voxels for a peak, if there are any."""
         for level in self._half_heights(part):
             if level.is_edge:
                 return [level]
@@ -424,9 +427,10 @@ class _FieldLevels:
         )
 
     def _slope(self, value: float, width: float) -> float:
-        """Return the mean slope around a level, in voxel values per um; 0 if all values are far.
+        """Return the mean slope around a level, in voxel values per um; 0 if no voxel is near it.
 
-        The range grows until it holds enough voxels: noise-free data has few between its heights.
+        The range around the level grows until it holds enough voxels. In data without noise, few
+        values lie between those of the bodies and the background.
         """
         away = np.abs(self.histogram.centres - value)
         for factor in (1, 2, 4, 8):

@@ -69,7 +69,7 @@ class _CoarseVolume:
 class CoarseTiles:
     """The coarse volumes of all tiles after they were written.
 
-    apart  distance of their voxels as a multiple of the distance of the blocks; at least 1
+    apart  distance of two voxels, as a multiple of that in the coarse channel; at least 1
     """
 
     tiles: tuple[BundleTile, ...]
@@ -125,7 +125,12 @@ def write_coarse_tiles(
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """The inputs of a channel's volumes."""
+    """The inputs from which the volumes of a channel are sampled.
+
+    coarse      voxels of the whole specimen at a coarse level
+    appearance  its window becomes 0 to 255
+    holder      pieces, such as a CT's table, that are left out; None: there are none
+    """
 
     channel: Channel
     coarse: CoarseChannel
@@ -135,7 +140,11 @@ class _Source:
     def voxels(
         self, plan: Plan, tile: Tile, apart: float, planes: slice = slice(None)
     ) -> NDArray[np.uint8]:
-        """Return a tile's voxels with the apron, uint8 (z, y, x) of the window; or some planes."""
+        """Return a tile's voxels with the apron, uint8 (z, y, x): 0 to 255 over the display window.
+
+        apart   distance of two voxels, as a multiple of that in the coarse channel
+        planes  the planes along z to return
+        """
         # Averaging comes before interpolation, which would skip voxels between distant places.
         coarse = self.coarse.averaged(int(apart))
         step = [one * apart for one in self.coarse.grid.step]
@@ -161,7 +170,7 @@ class _Source:
 
 
 def _sampled(plan: Plan, source: _Source) -> list[_Sample]:
-    """Return some planes of each part of a channel's volumes, at the distance of the blocks."""
+    """Return a few planes from each group of _EACH planes of a channel's volumes."""
     found = []
     for tile in plan.tiles:
         count = len(places_in(tile.lattice(plan.region), source.coarse.grid.step)[0])
@@ -174,7 +183,7 @@ def _sampled(plan: Plan, source: _Source) -> list[_Sample]:
 
 
 def _estimate(greys: _Greys, source: _Source, sampled: Sequence[_Sample]) -> float:
-    """Return the approximate number of bytes of a channel's volumes, rounded to these greys."""
+    """Return about how many bytes a channel's volumes take when rounded to these greys."""
     return sum(
         _MIPS * share * len(encode_3d([source.rounded(part, greys)]).data)
         for part, share in sampled

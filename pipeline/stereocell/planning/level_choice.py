@@ -239,7 +239,7 @@ def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
 
 
 def choose_by_components(options: IsoValueOptions, by_level: Sequence[Components]) -> int:
-    """Return the index of the level whose connected components fit the settings best.
+    """Return the index of the iso-level whose connected components fit a choice of `options` best.
 
     by_level  the ComponentSums of each tile, for each level; a single level is returned unjudged
     """

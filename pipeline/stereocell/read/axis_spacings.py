@@ -52,14 +52,14 @@ class AxisSpacings:
             self._stated[axis].append(Statement(float(spacing_um), place, trust))
 
     def add_all(self, spacing_um: Sequence[float], place: str, trust: Trust = Trust.STATED) -> None:
-        """Add the spacing (z, y, x)."""
+        """Add the spacing (z, y, x), um."""
         for axis, value in zip("zyx", spacing_um, strict=True):
             self.add(axis, value, place, trust)
 
     def add_attributes(
         self, attributes: Mapping[str, Any], of: str, trust: Trust = Trust.STATED
     ) -> None:
-        """Add the spacings in the attributes of the array, or of a group around it.
+        """Add the spacings in the attributes of the array, or of a group around it, as statements.
 
         of  name of the array or the group, for notes
         """

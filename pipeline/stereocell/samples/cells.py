@@ -67,7 +67,7 @@ class CellTissue:
     labels   uint32 (z, y, x), 1 to n; 0 between cells
     centres  float64 (n, 3), um, (z, y, x)
     types    int64 (n,), indices in TYPES
-    levels   float64 (n, markers), from 0; 1 is a channel's full brightness
+    levels   float64 (n, markers), brightness of each marker, from 0; 1 is the channel's full one
     """
 
     labels: NDArray[np.uint32]
@@ -155,7 +155,7 @@ def make_tissue(shape: tuple[int, int, int], seed: int) -> CellTissue:
 
 
 def _types(centres: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return the cells' types. They form patches along a smooth field, with some cells mixed in."""
+    """Return the cells' types: patches along a fixed wave in space, mixed a little at random."""
     wave = np.sin(centres @ np.array([0.03, 0.055, 0.04])) + np.cos(centres[:, 2] * 0.05)
     rank = np.argsort(np.argsort(wave + rng.normal(0, 0.35, len(centres)))) / len(centres)
     return np.searchsorted(np.cumsum(_SHARES)[:-1], rank, side="right")

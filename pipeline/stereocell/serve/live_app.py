@@ -47,7 +47,7 @@ _NOW = {"Cache-Control": "no-store", **policy("application/json")}
 
 
 class LiveApp:
-    """The application that serves a source while it is built."""
+    """The application that shows a source while its bundle is being built."""
 
     def __init__(self, live: Live, built: Callable[[Path], ASGIApp]) -> None:
         """built: returns the application that serves a whole bundle."""

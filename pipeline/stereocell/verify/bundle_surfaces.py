@@ -33,7 +33,9 @@ from stereocell.verify.bundle_files import COLOR_STEP
 
 _UM_PER_METRE = 1e6
 _MAP_DIFFERENCE = 1.0  # 0..255, largest mean difference of texels, since encoders may differ
-_ODD_SHARE = 0.01  # share of a surface's area that may differ (slivers)
+# Share of a surface's area that may differ between stage and bundle, since rounded positions turn
+# very thin triangles
+_ODD_SHARE = 0.01
 _TURNED = math.radians(3)  # rad, largest difference of normals: two steps of 8-bit octahedral ones
 _UV_STEP = 1e-4  # share of a map's edge; six steps of 16 bits
 _ROUNDED = 1.001  # factor, since errors are rounded up to four digits

@@ -79,8 +79,10 @@ class SourceTask:
 class UnitFinding:
     """The result of one unit.
 
-    levels  (stated, found, largest) distance of each level, um
-    cover   the source's voxels that the surface covers; None without an iso-value
+    levels  of each level, um: the distance that the stage states, and the distance (99th
+            percentile) and the largest distance that were found
+    cover   numbers of the source's voxels that the surface covers and leaves out; None without an
+            iso-value
     """
 
     name: str

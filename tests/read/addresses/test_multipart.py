@@ -91,12 +91,12 @@ def test_an_endless_header_is_refused() -> None:
         f"multipart/related; boundary={'x' * 71}",
     ],
 )
-def test_parts_without_a_boundary_are_refused(content_type: str) -> None:
+def test_answers_of_parts_without_a_boundary_are_refused(content_type: str) -> None:
     with pytest.raises(SourceError, match="boundary"):
         boundary_of(content_type, "here")
 
 
 @pytest.mark.parametrize("content_type", ["", "text/html", "application/dicom", "multipart/mixed"])
-def test_another_type_is_refused(content_type: str) -> None:
+def test_an_answer_of_another_content_type_is_refused(content_type: str) -> None:
     with pytest.raises(SourceError, match="multipart/related"):
         boundary_of(content_type, "here")

@@ -120,7 +120,8 @@ def serving_inbox(
     with patch.object(inbox_server, "viewer_dist", lambda: page):
         server = InboxServer(box, limits, make or FakeBuilds(), port=0, lan=lan)
     with ExitStack() as stack:
-        # A test may serve a second inbox within the first one, and each sets its own classes.
+        # Each inbox replaces the classes that read and build. A test may serve a second inbox while
+        # the first one runs.
         child, process = (NearReader, NearBuild) if is_near else (Child, BuildProcess)
         stack.enter_context(patch.object(readers, "Child", child))
         stack.enter_context(patch.object(builds, "BuildProcess", process))

@@ -31,7 +31,7 @@ export const ADDITION_KEYS: readonly KeyGroup[] = [
     name: "Added",
     rank: 75,
     keys: [
-      key("F7", "Hide or show all objects that were added to the specimen", ({ state }) => {
+      key("F7", "Hide or show all objects that layers of the stage add", ({ state }) => {
         const { additions, hiddenAdditions } = state;
         if (additions.length === 0) return no(NO_ADDITIONS);
         return { type: "hide-additions", hidden: hiddenAdditions.length > 0 ? [] : additions };

@@ -77,7 +77,7 @@ export const SHAPE_KEYS: readonly Key[] = [
       return { panel: "shape", shape: { index: (present + 1) % count, count }, grab: null };
     }),
   ),
-  key(";", "Next number of the shape", ({ view }) => {
+  key(";", "Choose the next number of the shape, such as its opacity", ({ view }) => {
     const ids = SHAPE_NUMBERS.map(({ id }) => id);
     const id = neighbour(ids, view.shapeNumber ?? ids[0], 1);
     return id === null ? NO_SHAPE : { panel: "shape-number", id };

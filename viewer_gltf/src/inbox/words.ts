@@ -25,7 +25,7 @@ export function stateName(
     return names[upload.doing as keyof typeof names] ?? "Uploading";
   }
   if (waits) return "Waiting";
-  if (doing === "queued") return place > 0 ? `In the queue: ${place}` : "In the queue";
+  if (doing === "queued") return place > 0 ? `Number ${place} in the queue` : "In the queue";
   return {
     unpacking: "Checking",
     understanding: "Reading",

@@ -149,7 +149,7 @@ export function shapeText({ kind, values, gradients, opacity, softness, color }:
   ].join(", ");
 }
 
-/** Describes a change of the shapes. */
+/** Returns words for the user on a change of the shapes of a two-dimensional transfer function. */
 export function changeText(before: Shapes, after: Shapes): string {
   if (after.length > before.length) return `Added a ${shapeText(after[after.length - 1])}`;
   if (after.length < before.length) return `Removed a shape: ${after.length} left`;

@@ -16,7 +16,7 @@ export const VIEW_KEYS: readonly Key[] = [
   key("a", "From the side (along x)", "side"),
   key("y", "From the top (along y)", "top"),
   key("r", "Reset the view", "reset"),
-  key("Ctrl+z", "Undo the last change of the view", "undo"),
+  key("Ctrl+z", "Undo the last change", "undo"),
   key(["Ctrl+Z", "Ctrl+y"], "Redo the last undone change", "redo"),
   key("Shift+Enter", "Full screen, or back to the window", "full-screen"),
 ];

@@ -42,7 +42,7 @@ const KEYS: readonly Key[] = [
   key("G", "Path tracing on or off", ({ state }) =>
     setTo(MODE, isTraced(state) ? "all" : "traced"),
   ),
-  key("F", "Choose the next setting of path tracing or stereo", nextNumber(1)),
+  key("F", "Choose the next setting of path tracing, then of stereo", nextNumber(1)),
   key("X", "Choose the previous setting of path tracing or stereo", nextNumber(-1)),
   key("[", "Decrease the chosen setting of path tracing or stereo", changeBy(-1)),
   key("]", "Increase the chosen setting of path tracing or stereo", changeBy(1)),

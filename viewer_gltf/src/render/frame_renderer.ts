@@ -45,10 +45,12 @@ export type Drawn = Readonly<{
   solids: number;
 }>;
 
-/** Pixels of the volumes per pixel of the frame, 0 to 1, and traced samples per pixel. */
+/** The quality of one frame. */
 export type FramePace = Readonly<{
+  /** Pixels of the volumes per pixel of the frame, 0 to 1. */
   resolution: number;
   isMoving: boolean;
+  /** Traced samples per pixel. */
   passes: number;
   /**
    * Whether edges are anti-aliased, which takes a third of a frame of surfaces on a software
@@ -104,7 +106,7 @@ export class FrameRenderer {
   private readonly overWithin: Overlay;
   private readonly mixed = new Scene();
   private moved = 0;
-  /** Key of the stand-in march; "" if it must be drawn. */
+  /** Key of the march that stands in for path tracing; "" if it must be drawn. */
   private standInKey = "";
   private readonly point = new Vector3();
   private readonly lamp = new Vector3();
@@ -136,9 +138,9 @@ export class FrameRenderer {
   /**
    * Draws a frame.
    *
-   * @param head its pose in the scene
+   * @param head pose of the head in the scene
    * @param clip the clip planes and box
-   * @param pace how much the frame's budget allows
+   * @param pace the quality that the time for a frame allows
    */
   draw(
     head: Matrix4,

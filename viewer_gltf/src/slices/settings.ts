@@ -43,14 +43,14 @@ declare module "../state/actions" {
 }
 
 export const NO_SLICES =
-  "No slices are shown. Switch on “Images” or “In the specimen” under Slices.";
+  "No slices are shown. Switch on “As images” or “In the specimen” under Slices.";
 
 const lens = lensesOf<SliceSettings>();
 
 export const SLICE_PICTURES: SwitchParameter<SliceSettings> = {
   kind: "switch",
   id: "slice-pictures",
-  label: "Images",
+  label: "As images",
   name: () => "Slices as images",
   link: "slices",
   ...lens("hasSlicePictures"),

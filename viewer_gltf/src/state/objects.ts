@@ -74,10 +74,10 @@ export const START_OBJECTS: ObjectView = {
   linked: "",
 };
 
-/** Views by channel; a channel without an entry has START_OBJECTS. */
+/** How each channel's objects are shown, by channel; one without an entry has START_OBJECTS. */
 export type ObjectViews = Readonly<Record<string, ObjectView>>;
 
-/** Changes some fields of the view of a channel. */
+/** Changes how a channel's objects are shown; absent fields stay. */
 export type ObjectChange = Readonly<{
   type: "objects";
   channel: string;

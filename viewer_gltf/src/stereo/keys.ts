@@ -5,7 +5,7 @@ import { SCREEN_STEREO, STEREO_PARAMETERS } from "../state/parameters/tools";
 const KEYS: readonly Key[] = [
   key("V", "Enter stereo (VR), or leave it", "stereo"),
   key("Home", "View in your room (AR), or leave it", "room"),
-  key("L", "Next Cardboard viewer", ({ view }) => {
+  key("L", "Next lens profile of a Cardboard viewer", ({ view }) => {
     const lenses = neighbour(LENSES, view.lenses, 1);
     return lenses === null ? no("There is no Cardboard viewer.") : { panel: "lenses", lenses };
   }),

@@ -49,7 +49,7 @@ describe("empty-space tables from the worker", () => {
     expect([await first, await second]).toEqual([Uint8Array.of(1), Uint8Array.of(2)]);
   });
 
-  it("are null if a newer request with the same key has replaced them", async () => {
+  it("are null for a request that a newer one with the same key has replaced", async () => {
     const { asked, answer, client } = standIn();
     const all = [1, 2, 3, 4].map((x) => client.computeDistances("a", request(x)));
     answer(); // answers the first, which is outdated by now
@@ -70,7 +70,7 @@ describe("empty-space tables from the worker", () => {
     expect(await other).toEqual(Uint8Array.of(10));
   });
 
-  it("fail one by one if the worker throws, and the next one continues", async () => {
+  it("fail for the current request alone if the worker throws; the next request is answered", async () => {
     const { answer, client, fail } = standIn();
     const bad = client.computeDistances("a", request(1));
     const good = client.computeDistances("b", request(2));

@@ -11,7 +11,7 @@ import { stride, volumeTexture } from "./volume_texture";
 
 export const LEVEL_FADE_S = 0.2;
 
-/** The loaded part: the texture's channels, in its order, and their bricks. */
+/** A loaded mip level: its texture, and the channels in their order in the texture. */
 export type Packed = Readonly<{
   channels: readonly string[];
   level: number;
@@ -23,16 +23,17 @@ export type Packed = Readonly<{
 }>;
 
 export class TileTexture {
+  /** The newest texture; null until the first one is loaded. */
   shown: Packed | null = null;
   /** The texture that `shown` replaces, while it fades in. */
   old: Packed | null = null;
-  /** Share of `shown`, 0 to 1. */
+  /** Weight of `shown` while it fades in over `old`, 0 to 1; 1 when the fade is over. */
   fresh = 1;
   isLoading = false;
 
   private sources: ReadonlyMap<string, VolumeSource> = new Map();
   private levels: readonly number[] = [];
-  /** The finest level that fits; finer ones are dropped. */
+  /** The finest mip level to show; a finer texture is replaced by it. */
   private finest = 0;
   /**
    * Channels with a fault, which was reported. They are not tried again until they are turned off
@@ -53,7 +54,7 @@ export class TileTexture {
     private readonly onError: (error: unknown) => void,
   ) {}
 
-  /** Bytes of GPU memory. */
+  /** GPU memory of the tile, bytes. */
   get bytes(): number {
     return [this.shown, this.old].reduce((sum, each) => sum + (each ? sizeOf(each) : 0), 0);
   }
@@ -136,7 +137,7 @@ export class TileTexture {
       if (this.levels.length > 0 && this.finest > shown.level) return this.finest;
       return this.levels.find((index) => index < shown.level) ?? null;
     }
-    // the finest level that is fully loaded; otherwise the first of the list
+    // the finest level of which all channels are loaded; otherwise the first of the list
     const isHere = (index: number) =>
       channels.every((id) => this.sources.get(id)?.has(index) === true);
     return [...this.levels].reverse().find(isHere) ?? this.levels[0] ?? null;

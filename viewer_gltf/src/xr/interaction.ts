@@ -64,7 +64,7 @@ export class Hands {
   private taps: number[] = [];
   private isRunning = false;
   private readonly lastChoice = new LastChoice();
-  /** State at the moment when the specimen was picked up with the bar. */
+  /** Pose and gaze at the moment when the bar's button picked up the specimen. */
   private barHold: HeadHold | null = null;
   private state: ViewerState | null = null;
 
@@ -177,7 +177,7 @@ export class Hands {
 
   /**
    * Presses the only button of the split screen, or the key that stands for it.
-   * @param time_ms on the clock of events
+   * @param time_ms time of the press, on the clock of DOM events
    */
   tap(time_ms = this.now_ms()): void {
     this.taps.push(time_ms);
@@ -293,7 +293,7 @@ export class Hands {
     this.mover.jumpTo(before.pose, this.gaze.origin);
   }
 
-  /** Picks up the specimen with the bar, then moves it with the gaze until the gaze rests. */
+  /** Picks up the specimen after the bar's button, then moves it with the gaze until the gaze rests. */
   private carrySpecimen(gaze: SceneRay, isStart: boolean): void {
     if (isStart && this.state !== null) {
       this.barHold = this.mover.holdBy(gaze, this.state);

@@ -271,7 +271,7 @@ describeInChromium("an artist's layer over the stage", () => {
       await chooseQuality("low");
     });
 
-    it("makes a block as opaque as its new opacity points", async () => {
+    it("draws the slab as opaque as the opacity points that the stage's edit gave it", async () => {
       await openOnce();
       await only(stand, "Slab", "volume");
       await stand.viewer.recolor("Slab", "#ffffff");
@@ -282,7 +282,7 @@ describeInChromium("an artist's layer over the stage", () => {
       const expected = 1 - (1 - SLAB_OPACITY) ** (SLAB_VOXELS / cosine);
       const at = spot(picture, stand.manifest, point);
       const [found, facing] = [lightAt(picture, at), lightFacing(picture, at)];
-      // Inside, apart from its faces, the block is lit like a medium without a boundary.
+      // Inside, apart from its faces, the slab is lit like a medium without a boundary.
       expect(Math.abs(found / (SCATTERED * facing) - expected)).toBeLessThan(0.02);
     });
 

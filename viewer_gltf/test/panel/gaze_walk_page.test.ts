@@ -97,7 +97,7 @@ async function walk(stand: Stand, only = "") {
           if (id.endsWith("/open")) await walkGroup(name, id);
           else if (!tryOut(id)) again.push(id);
           walked.push(id);
-          // lets code load that a control needs
+          // one turn of the event loop, in which code that a control needs may begin to load
           await new Promise((resolve) => setTimeout(resolve));
         }
         // a control without a response is tried again after another one, because its value or

@@ -17,8 +17,8 @@ const NEAR = "&switch=9";
 const SOFT = "#v=1&depth=0&l=Balls:tsoft,F_x20_body:tsoft";
 
 /**
- * Counts the pixels of the disc's image that are outside the range of the images within and without
- * it, by more than 5, and those between both.
+ * Counts pixels of the disc's image against the images of its inside and its outside. `outside`: the
+ * colour is beyond both by more than 5. `between`: it differs from both by more than 2.
  */
 function rimOf(disc: Picture, within: Picture, without: Picture) {
   let [outside, between] = [0, 0];
@@ -83,8 +83,8 @@ describeInChromium("surface or volume", () => {
 
   const drawn = new Map<Mode, Picture>();
   /**
-   * Images with soft volumes, drawn once for all tests; the last one is on screen if it is drawn
-   * now.
+   * Images with soft volumes, drawn once for all tests. The screen shows the last of the images that
+   * this call had to draw.
    */
   async function as(...modes: Mode[]): Promise<Picture[]> {
     const missing = modes.filter((mode) => !drawn.has(mode));

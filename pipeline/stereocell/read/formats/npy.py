@@ -48,7 +48,9 @@ def _open(location: Location, *, axes: str = "") -> Image:
     array = VoxelArray(stored, names)
     channels = array.size("c")
     if channels > MAX_CHANNELS:
-        raise SourceError(f"{where}: axis c: found {channels}, expected at most {MAX_CHANNELS}")
+        raise SourceError(
+            f"{where}: axis c: found {channels} channels, expected at most {MAX_CHANNELS}"
+        )
     return Image(
         arrays=(array,),
         grids=(Grid(array.shape),),

@@ -70,7 +70,9 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         array = VoxelArray(_DaskArray(image.dask_data), tuple(image.dims.order.lower()))
         names = [None if _MADE_UP.fullmatch(name) else name for name in image.channel_names or ()]
     if (count := array.size("c")) > MAX_CHANNELS:
-        raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+        raise SourceError(
+            f"{where}: axis c: found {count} channels, expected at most {MAX_CHANNELS}"
+        )
     named = (*names[:count], *[None] * (count - len(names)))
     spacing, more = _settle_spacing(image)
     grid = Grid(array.shape, spacing)

@@ -31,8 +31,8 @@ uniform vec3 uColor[CHANNELS];  // linear RGB
 uniform bvec4 uInDisc;  // channels that are shown only in the disc
 uniform bool uAllInDisc;
 uniform vec3 uApex;  // um: apex of the disc's cone
-uniform vec3 uAxis;  // its axis, a unit vector
-uniform vec2 uDisc;  // cosines of its inner and outer radius
+uniform vec3 uAxis;  // the cone's axis, a unit vector
+uniform vec2 uDisc;  // cosines of the disc's inner and outer radius
 // Cosine of the marched radius, slightly larger for pixels that mix with others.
 uniform float uReach;
 uniform bool uIsCrossing;  // whether all marched channels are shown only in the disc
@@ -67,10 +67,10 @@ uniform float uDepthShading;  // strength of the shading, 0 to 1
 uniform sampler2D uNoise;  // blue noise
 uniform float uPhase;  // shift of the noise in this frame, 0 to 1
 uniform vec4 uEye;  // the eye's part of the frame: x, y, width, height, pixels
-uniform vec4 uPart;  // its part of the image that is drawn here, which may have fewer pixels
+uniform vec4 uPart;  // the eye's part of the image that is drawn here, which may have fewer pixels
 
-// At a covered sample, because otherwise rays at a tile's edge would miss the tile and leave a
-// seam.
+// The position lies at a covered sample of the pixel. Otherwise rays at a tile's edge would miss the
+// tile and leave a seam.
 centroid in vec3 vPosition;
 flat in vec3 vEye;
 flat in vec3 vLight;
@@ -107,9 +107,9 @@ layout(location = 1) out vec4 oBehind;  // behind the pane
 const float NOWHERE = 1e30;
 
 #ifdef SUM
-// Light of opaque matter over the mean edge of all marched tiles. Screens show thin and thick
-// structures: a tenth of the light looks a third as bright, and few specimens are more than half
-// full.
+// Light that a ray collects in opaque matter as long as the mean edge of the box around all tiles; 1
+// is white. The value is above 1, because few specimens are more than half full. Thin structures
+// stay visible beside thick ones: on a screen, a tenth of the light looks a third as bright.
 const float SUM_LIGHT = 4.0;
 #endif
 #ifdef MAXIMUM
@@ -155,7 +155,7 @@ void main() {
   if (uAllInDisc) span = coneSpan(span, vEye, dir);
 #endif
   vec3 scene = sceneDistances(back);
-  // From here on t starts where the ray enters: far from the eye, floats would be too coarse.
+  // From here on, t is 0 where the ray enters: from a far eye, floats would be too coarse.
   vec3 start = vEye + span.x * dir;
   float edge = min(span.y, scene.x) - span.x;
   float end = min(span.y, scene.y) - span.x;
@@ -172,7 +172,7 @@ void main() {
   vec4 largest = vec4(0.0);  // intensities
 #endif
   vec4 sum = vec4(0.0);
-  vec4 veil = vec4(0.0);  // the sum in front of the edge
+  vec4 veil = vec4(0.0);  // the sum up to the edge, where the scene lies at the pixel's centre
   float pane = uHasPane ? paneDistance(back) - span.x : NOWHERE;
   vec4 front = vec4(0.0);  // the sum in front of the pane
   bool isBehind = false;
@@ -183,7 +183,7 @@ void main() {
   float light = SUM_LIGHT * uVoxel / pow(across.x * across.y * across.z, 1.0 / 3.0);
 #endif
   float t = 0.0;
-  float exit = 0.0;  // end of the bricks that are known
+  float exit = 0.0;  // t up to which the bricks were looked up
   int i = 0;
 #if defined(MAXIMUM) || defined(SUM)
   const float FULL = 2.0;  // no sample hides another

@@ -101,8 +101,8 @@ describe("the bar", () => {
 });
 
 /**
- * Pitches, radians, of the largest cube on the table: its near lower edge, and its upper edge in
- * the middle.
+ * Pitches at which the eyes see the largest cube on the table, radians: its near lower edge, and
+ * the middle of its upper face.
  */
 function cubeOnTable(): readonly [lower: number, upper: number] {
   const halfEdge_m = (LONGEST_EDGE_M * ROOM_SIZE) / 2;

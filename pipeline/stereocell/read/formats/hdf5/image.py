@@ -73,7 +73,7 @@ def _image(tree: Hdf5Tree, location: Location, axes: str) -> Image:
     array = VoxelArray(values, names)
     if array.size("c") > MAX_CHANNELS:
         raise SourceError(
-            f"{where}: axis c: found {array.size('c')}, expected at most {MAX_CHANNELS}"
+            f"{where}: axis c: found {array.size('c')} channels, expected at most {MAX_CHANNELS}"
         )
     unnamed = (None,) * array.size("c")
     grid = grid_of(array.shape, found.spacing_um, found.hint)

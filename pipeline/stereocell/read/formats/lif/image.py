@@ -188,7 +188,9 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
     with one_line(where, "a LIF file whose XML describes its voxels"):
         notes = (*notes, *_memory_notes(where, image))
     if (count := array.size("c")) > MAX_CHANNELS:
-        raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+        raise SourceError(
+            f"{where}: axis c: found {count} channels, expected at most {MAX_CHANNELS}"
+        )
     places = np.asarray(image.coords.get("Z", ()), float) * _UM_PER_METER
     if len(places) > 1:
         notes = (*notes, *falling_notes("position along z", float(places[0]), float(places[-1])))

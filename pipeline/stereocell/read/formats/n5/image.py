@@ -180,7 +180,9 @@ def _pyramid(
     valued = [scaled(files.where, array, finest) for array in arrays]
     voxels = tuple(VoxelArray(array, names) for array, _ in valued)
     if (count := voxels[0].size("c")) > MAX_CHANNELS:
-        raise SourceError(f"{files.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+        raise SourceError(
+            f"{files.where}: axis c: found {count} channels, expected at most {MAX_CHANNELS}"
+        )
     spacing, spacing_notes = settle_spacing(finest, group, names)
     scales = [_factors(group, attributes, i, names) for i, (_, attributes) in enumerate(levels)]
     grids = grids_of([v.shape for v in voxels], spacing, scales)

@@ -94,7 +94,9 @@ def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack)
                 f"{file.where}: found {size} {kind}, expected z, y, x, channels, time and positions"
             )
     if (count := file.size("C")) > MAX_CHANNELS:
-        raise SourceError(f"{file.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+        raise SourceError(
+            f"{file.where}: axis c: found {count} channels, expected at most {MAX_CHANNELS}"
+        )
     with one_line(file.where, "an ND2 file with metadata on its axes"):
         _require_distances(file)
         notes = (*notes, *file.notes, *_order_notes(file))

@@ -55,7 +55,7 @@ def read_array(location: Location, store: Store, path: str, *, axes: str = "") -
     voxels = VoxelArray(stored, names)
     if voxels.size("c") > MAX_CHANNELS:
         raise SourceError(
-            f"{where}: axis c: found {voxels.size('c')}, expected at most {MAX_CHANNELS}"
+            f"{where}: axis c: found {voxels.size('c')} channels, expected at most {MAX_CHANNELS}"
         )
     unnamed = (None,) * voxels.size("c")
     ignored = [ignored_note(of, attributes) for of, attributes in around.attributes]

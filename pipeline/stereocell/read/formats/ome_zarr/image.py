@@ -361,7 +361,9 @@ def _channels(
     if not isinstance(channels, list):
         raise SourceError(f"{where}: omero.channels: found {channels!r:.60}, expected a list")
     if count > MAX_CHANNELS:
-        raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
+        raise SourceError(
+            f"{where}: axis c: found {count} channels, expected at most {MAX_CHANNELS}"
+        )
     entries = [entry for entry in channels if isinstance(entry, Mapping)]
     if len(entries) > count:
         raise SourceError(
