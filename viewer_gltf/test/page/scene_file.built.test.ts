@@ -157,7 +157,7 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
 
   it("draws only the coarse levels that fit, without a notice", async () => {
     const refusal = await write("none", "0.1").catch((error: Error) => error.message);
-    const [, least] = /takes ([\d.]+) MB, expected as much/.exec(refusal) ?? [];
+    const [, least] = /expected at least ([\d.]+), as the page/.exec(refusal) ?? [];
     expect(Number(least)).toBeGreaterThan(0.5);
     const about = await write("small", String(Number(least) + 0.005));
     expect(about).toMatch(/left out: \d+ finer levels? of surfaces, \d+ finer levels? of volumes/);
