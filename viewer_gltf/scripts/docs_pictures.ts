@@ -29,6 +29,9 @@ type Picture = Readonly<{
 /** Time, ms, after which an announcement about a pressed key has disappeared from the view. */
 const SPOKEN_MS = 9000;
 
+/** Time, ms, in which path tracing becomes free of visible noise without a GPU. */
+const GATHERING_MS = 90_000;
+
 const SMALL = [640, 360] as const;
 const WITH_PANEL = [1000, 560] as const;
 
@@ -61,10 +64,12 @@ async function click(viewer: ViewerPage, across: number, down: number): Promise<
   await viewer.settled();
 }
 
-/** Opens a section of the panel and scrolls it into view. */
+/** Opens a section of the panel and scrolls its heading to the upper end of the panel. */
 async function show(viewer: ViewerPage, section: string): Promise<void> {
   await viewer.unfold(section);
-  await viewer.page.locator(`h2 [data-opener="${section}"]`).scrollIntoViewIfNeeded();
+  await viewer.page
+    .locator(`h2 [data-opener="${section}"]`)
+    .evaluate((heading) => heading.scrollIntoView({ block: "start" }));
   await viewer.settled();
 }
 
@@ -73,7 +78,12 @@ const TABLE: Readonly<Record<string, Picture>> = {
   "mode-off": { sample: "demo", size: SMALL, query: "panel=off&mode=off", act: goNearer },
   "mode-disc": { sample: "demo", size: SMALL, query: "panel=off&mode=disc", act: goNearer },
   "mode-all": { sample: "demo", size: SMALL, query: "panel=off&mode=all", act: goNearer },
-  "path-tracing": { sample: "mri-demo", size: SMALL, query: "panel=off&mode=traced" },
+  "path-tracing": {
+    sample: "mri-demo",
+    size: SMALL,
+    query: "panel=off&mode=traced",
+    act: (viewer) => viewer.page.waitForTimeout(GATHERING_MS),
+  },
   "card-of-a-place": {
     sample: "demo",
     size: WITH_PANEL,
@@ -89,7 +99,9 @@ const TABLE: Readonly<Record<string, Picture>> = {
     size: WITH_PANEL,
     act: async (viewer) => {
       await press("H")(viewer);
-      await viewer.page.getByText("+ Rectangle").scrollIntoViewIfNeeded();
+      await viewer.page.getByText("+ Rectangle").click();
+      await viewer.settled();
+      await viewer.page.getByText("Value and gradient").scrollIntoViewIfNeeded();
     },
   },
   "cut-by-a-box": {
