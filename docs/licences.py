@@ -20,6 +20,7 @@ UNSTATED = {
     "alktx2": "none stated; it holds Basis Universal, Apache-2.0",
     "hdf5plugin": "MIT; its filters have their own (its file LICENSE)",
     "openexr": "BSD-3-Clause (its file LICENSE.md)",
+    "python-dateutil": "BSD-3-Clause; parts since December 2017 also under Apache-2.0",
 }
 # SPDX identifiers of licences by their names in classifiers
 CLASSIFIERS = {
@@ -38,7 +39,8 @@ their own metadata.
 
 StereoCell is under Apache-2.0. It contains none of these packages: `pip` installs them beside it,
 each under its own licence. No package of an installation without extras is under the GPL; a test
-checks that. Packages under the LGPL are used unchanged."""
+checks that. Packages under the LGPL are used unchanged. JPEG in DICOM is decoded by python-gdcm,
+imagecodecs and pylibjpeg-openjpeg."""
 _LONGEST = 60  # characters of a licence's name; longer ones are the licence's text
 
 
@@ -74,7 +76,9 @@ def direct_requirements() -> list[DirectRequirement]:
 
 
 def licence_of(name: str) -> str:
-    """Return a package's licence as its metadata states it, or as UNSTATED does."""
+    """Return a package's licence as UNSTATED or else its metadata states it."""
+    if unstated := UNSTATED.get(canonicalize_name(name)):
+        return unstated
     metadata = distribution(name).metadata.json
     if expression := metadata.get("license_expression"):
         return str(expression)
@@ -84,7 +88,7 @@ def licence_of(name: str) -> str:
     classes = metadata.get("classifier", [])
     named = [line.rpartition(" :: ")[2] for line in classes if line.startswith("License :: ")]
     named = [CLASSIFIERS.get(one, one) for one in named if one != "OSI Approved"]
-    return " OR ".join(named) or UNSTATED.get(canonicalize_name(name)) or stated.partition("\n")[0]
+    return " OR ".join(named) or stated.partition("\n")[0]
 
 
 def is_gpl(licence: str) -> bool:
@@ -155,7 +159,10 @@ def _lines() -> Iterator[str]:
     yield ""
     yield "## Packages that these require"
     yield ""
-    yield "On Linux these packages are installed without extras. Other systems may add a few."
+    yield (
+        "The packages above bring these with them on Linux, if no extra is installed. Other\n"
+        "systems may add a few. Packages that only the extras bring are not listed."
+    )
     yield ""
     yield "| package | licence |"
     yield "|---|---|"

@@ -47,9 +47,8 @@ PLAN_SCHEMA = Draft202012Validator(json.loads(schema_path("plan.schema.json").re
 lengths = st.integers(2, 90)
 shapes = st.tuples(st.integers(2, 40), lengths, lengths)
 spacings = st.tuples(*[st.floats(0.05, 5.0)] * 3)
-names = st.text(min_size=1, max_size=40).filter(
-    str.isprintable
-)  # like the names that readers return
+# Names of channels have only printable characters, like those that readers return.
+names = st.text(min_size=1, max_size=40).filter(str.isprintable)
 volumes = npst.arrays(
     np.uint8,
     npst.array_shapes(min_dims=3, max_dims=3, min_side=1, max_side=21),

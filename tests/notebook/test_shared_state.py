@@ -44,7 +44,7 @@ def test_looks_that_can_t_be_are_refused_in_a_line(channels, message):
 @pytest.mark.parametrize(
     ("check", "value", "message"),
     [
-        (check_view, {"eye": (0, 0, 0)}, "no 'eye', expected eye_um and target_um"),
+        (check_view, {"eye": (0, 0, 0)}, "view: 'eye' is unknown, expected eye_um"),
         (check_view, {"eye_um": (0, 0)}, "expected x, y, z"),
         (
             check_view,

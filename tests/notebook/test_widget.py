@@ -134,7 +134,7 @@ def test_bytes_that_are_not_a_picture_are_not_kept(viewer):
         assert viewer._picture == b""
 
 
-def test_where_none_can_be_drawn_the_page_s_first_picture_is_kept(bundle, published):
+def test_the_page_s_first_picture_is_kept_where_python_can_draw_none(bundle, published):
     viewer = Viewer(NotebookBundle(bundle))
     viewer._ipython_display_()
     assert "image/png" not in published[1]["data"]

@@ -174,7 +174,7 @@ def test_orientations_of_axes_give_the_sides(tmp_path: Path) -> None:
     orient(path, "inferior-to-superior", "posterior-to-anterior", "left-to-right")
     dataset = read.open(path)
     assert dataset.has_sides
-    # Canonical axes run to the front, to the feet and to the left.
+    # In canonical order, z runs to the front, y to the feet and x to the left.
     expected = BODY.transpose(1, 0, 2)[:, ::-1, ::-1]
     box = dataset.levels[0].box
     np.testing.assert_array_equal(dataset.read(0, box).voxels, expected)

@@ -32,7 +32,7 @@ def test_each_missing_thing_has_a_cost(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_on_a_bare_machine(tmp_path: Path) -> None:
-    """The PATH and the environment are empty, and there is no display."""
+    """The PATH names an empty folder, and HOME is the only other variable."""
     answer = subprocess.run(
         [sys.executable, "-m", "stereocell.cli", "doctor", "--json"],
         env={"HOME": str(tmp_path), "PATH": str(tmp_path)},

@@ -38,7 +38,8 @@ def read_windowed(
     if voxels.shape != volume.size[::-1]:
         found = tuple(voxels.shape[::-1])
         raise StageError(
-            f"{volume.atlas}: found {found} voxels, expected {volume.size} as in the stage"
+            f"{volume.atlas}: found {found} voxels, expected {volume.size}, which the stage "
+            "states for this file"
         )
     return appearance.window_voxels(voxels)
 

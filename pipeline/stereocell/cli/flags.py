@@ -395,7 +395,8 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--everywhere",
         action="store_true",
-        help="learn from everything but the background (default in MR: from the brain alone)",
+        help="learn the classes from all voxels but the background (default in MR: from the brain "
+        "alone)",
     )
 
 
@@ -498,7 +499,10 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
         "--tiles", type=_names, default=(), metavar="r0_c0,r0_c1", help="write these tiles alone"
     )
     parser.add_argument(
-        "--region", metavar="x0:x1,y0:y1,z0:z1", help="write this box alone, in um of the stage"
+        "--region",
+        metavar="x0:x1,y0:y1,z0:z1",
+        help="write this box alone, in um of the stage: x first, y upwards. The --region of "
+        "`build` is in voxels instead, z first",
     )
     parser.add_argument("--stage", type=_file, help="an edited stage to use instead of OUT/stage")
     parser.add_argument(

@@ -11,7 +11,7 @@ from stereocell.planning.settings import NO_PRESET, preset_names
 DARK, BRIGHT = "dark", "bright"  # brightness of the background around structures
 _MAX_CHANNELS = 1000
 _MAX_SERIES = 100_000
-_MAX_UM = 1e7  # um, limit of the voxel spacing
+_MAX_UM = 1e7  # um; a larger voxel spacing is refused
 
 
 @dataclass(frozen=True, slots=True)

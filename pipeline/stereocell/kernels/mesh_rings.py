@@ -13,7 +13,10 @@ from stereocell.kernels.surface_rings import check_fan_link, collect_fan, join_f
 
 @step
 def is_surface(mesh: Mesh) -> bool:
-    """Return whether the mesh is a surface; otherwise it consists of interfaces."""
+    """Return whether the mesh is one surface.
+
+    Otherwise it consists of interfaces: the boundaries that two touching objects share.
+    """
     return len(mesh.on_line) == 0
 
 

@@ -75,7 +75,7 @@ def check_view(view: Mapping[str, Any]) -> dict[str, list[float]]:
     """Return the eye and target of a camera, as far as given. Raises UsageError."""
     for name in view:
         if name not in ("eye_um", "target_um"):
-            raise UsageError(f"view has no {name!r:.40}, expected eye_um and target_um")
+            raise UsageError(f"view: {name!r:.40} is unknown, expected eye_um and target_um")
     checked = {name: _numbers(view[name], 3, f"view: {name}: expected x, y, z") for name in view}
     if len(checked) == 2 and checked["eye_um"] == checked["target_um"]:
         raise UsageError("view: eye_um equals target_um, expected two different points")

@@ -47,7 +47,7 @@ MAX_INDEX = 2**31  # largest index of a level, and of a voxel along an axis
 # Values of taken_as. The voxels are intensities even if they look like labels, or Hounsfield units
 # even if neither the source nor its voxels show it.
 INTENSITY, HOUNSFIELD = "intensity", "hounsfield"
-NO_PRESET = "none"  # stands for the defaults
+NO_PRESET = "none"  # name for the default settings without a preset
 PRESETS = Path(__file__).parent / "presets"
 # Bytes, characters: limits of a file of settings and of its lines. The time that tomllib needs for
 # a dotted key grows with the square of its length.
@@ -94,7 +94,8 @@ class PlanOptions:
         flag=Flag(
             "--region",
             "part to build, such as z0:z1,y0:y1,x0:x1 in voxels of the resolution level that is "
-            "built (without --level the finest one whose region has at most plan.max_voxels)",
+            "built (without --level the finest one whose region has at most plan.max_voxels). The "
+            "--region of `export` is in um instead, x first",
         ),
     )
     tile_size: tuple[int, ...] = setting(

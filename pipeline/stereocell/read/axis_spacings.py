@@ -115,8 +115,8 @@ class AxisSpacings:
             if np.isfinite(found).all():
                 rest = "neither rise nor fall throughout"
             self._notes.append(
-                f"positions of {name} {rest}: they are not used, so neighbouring planes may lie "
-                "in another order than the specimen's"
+                f"positions of {name} {rest}, so they are not used. Planes are read in the file's "
+                "order, which may not be the specimen's. If it is not, sort them in the file"
             )
 
     def settled(self) -> SettledSpacing:

@@ -13,7 +13,7 @@ from contextlib import suppress
 
 from zarr.core import sync
 
-_PATIENCE_S = 5  # seconds to wait for the reads to end
+_PATIENCE_S = 5  # seconds for which the program waits at its end until the reads have ended
 
 
 def end_reads() -> None:

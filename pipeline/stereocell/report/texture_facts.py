@@ -19,7 +19,8 @@ class LevelMaps:
 
     tiles     number of tiles with maps
     texel_um  smallest and largest edge of a texel over the tiles
-    without   number of tiles without maps, by reason; their values lie at vertices
+    without   number of tiles without maps, by reason; there the vertices hold the occlusion and the
+              sampled channel
     """
 
     level: int

@@ -142,7 +142,9 @@ def _kept_apart(
     centers     float64 (n, 3), centres (z, y, x) of the candidates, um
     reach       (n,), radii of the candidates, um
     in_tumor    (n,), whether a candidate lies in the tumour
-    candidates  (m,), mask of the candidates among all placements; the result has indices into it
+    candidates  (m,), mask that marks the n candidates among all m placements
+
+    The result has the indices of the kept placements among all m.
     """
     cell = 14.0  # um; centres that are further apart are never too close
     bins: defaultdict[tuple[int, int, int], list[tuple[float, ...]]] = defaultdict(list)

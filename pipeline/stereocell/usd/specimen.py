@@ -43,7 +43,10 @@ class Specimen:
 
     @property
     def shown(self) -> Sdf.Path:
-        """The parent of the prims whose visibility the channels' surfaces inherit."""
+        """The parent of one prim for each channel.
+
+        By USD's `inherits`, all surfaces and volumes of a channel take their visibility from it.
+        """
         return self._moved(SHOWN)
 
     @property

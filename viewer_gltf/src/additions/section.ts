@@ -21,14 +21,14 @@ export function additionSections(
       }),
     }),
   );
-  return [{ id: "additions", label: "Added", rank: 30, items }];
+  return [{ id: "additions", label: "Added objects", rank: 30, items }];
 }
 
 const NO_ADDITIONS = "No objects were added to this specimen.";
 
 export const ADDITION_KEYS: readonly KeyGroup[] = [
   {
-    name: "Added",
+    name: "Added objects",
     rank: 75,
     keys: [
       key("F7", "Hide or show all objects that layers of the stage add", ({ state }) => {

@@ -38,7 +38,9 @@ export const ADDITION_SETTINGS: PartSettings = {
       }),
       name: "additions",
       spoken: ({ hiddenAdditions: { length } }) =>
-        length === 0 ? "All added objects are shown" : "Some added objects are hidden",
+        length === 0
+          ? "All objects that were added to the stage are shown"
+          : "Some objects that were added to the stage are hidden",
     },
   },
 };

@@ -19,7 +19,7 @@ import { type Measurement, missing } from "../state/measurements";
 import type { MeasureKind } from "../state/parameters/tools";
 
 const UP = new Vector3(0, 1, 0);
-/** Colour of points and labels, as hex. */
+/** Colour of points and labels, as #rrggbb. */
 const COLOR = "#ffd24a";
 
 /** The points, segments and label of one measurement. */

@@ -75,6 +75,7 @@ export function benchCard(flight_s: number, options: BenchOptions): HTMLElement 
 
 const WORDS: Record<StereoKind, string> = { split: "the split screen", headset: "the headset" };
 
+/** Returns the progress, such as "2 of 12: disc, split, volumes of 256 voxels". */
 function words({ index, count, mode, eyes, edge }: Step): string {
   const size = edge === null ? "" : `, volumes of ${edge} voxels`;
   return `${index + 1} of ${count}: ${mode}, ${eyes}${size}`;

@@ -31,7 +31,7 @@ function element(id: number, ...content: readonly Node[]): Node {
   const digits = id.toString(16).match(/../g) ?? [];
   const length = new Uint8Array(8);
   new DataView(length.buffer).setBigUint64(0, BigInt(bytesOf(content)));
-  length[0] = 0x01; // marks a length of 8 bytes
+  length[0] = 0x01; // the first byte of EBML states that the length itself takes 8 bytes
   return [Uint8Array.from(digits.map((digit) => Number.parseInt(digit, 16))), length, content];
 }
 

@@ -203,7 +203,7 @@ describe("its block on the canvas panel", () => {
     controller.grant(request as Request);
     expect(controller.shapes[0].values[1]).toBeCloseTo(0.9, 2);
     expect(controller.shapes[0].gradients[1]).toBeCloseTo(0.9, 2);
-    expect(block.height).toBeLessThan(600); // the block fits on a page
+    expect(block.height).toBeLessThan(600); // px; the block fits on one page of the panel in stereo
   });
 
   it("reports why it refuses", () => {

@@ -14,7 +14,7 @@ export type Moment = Readonly<{
   isInStereo: boolean;
 }>;
 
-/** Name of a step that moves the camera. */
+/** Name of the undo step for a move of the camera. */
 const CAMERA_STEP = "viewpoint";
 /** Largest difference between two coordinates that count as equal, m. */
 const SAME_M = 1e-4;

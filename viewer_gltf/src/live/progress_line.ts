@@ -76,7 +76,7 @@ export class ProgressLine {
     this.keepFocus(isFocused);
   }
 
-  /** Moves the focus from a button that has just been hidden to the next one. */
+  /** Moves the focus to the first visible button if the focused one has just been hidden. */
   private keepFocus(isFocused: boolean): void {
     const buttons = [...Object.values(this.buttons), this.close];
     const { activeElement } = document;

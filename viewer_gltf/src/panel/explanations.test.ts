@@ -40,7 +40,7 @@ describe("the explanations", () => {
   it("exist for each setting that needs more than its name", () => {
     // The effect of these settings is clear from their names; all others need an `about`.
     const plain =
-      /^(color|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|sharpness|lamp|post).*|lamp-.*)$/;
+      /^(color|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|lamp|post).*|lamp-.*)$/;
     const silent = [...allParameters(), ...CHANNEL].filter(({ about }) => !about);
     expect(silent.map(({ id }) => id).filter((id) => !plain.test(id))).toEqual([]);
   });

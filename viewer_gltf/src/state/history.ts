@@ -65,8 +65,8 @@ export function withStep<T>(
 }
 
 /**
- * Undoes the last step. Returns the moment before it and the history then; null if there is no
- * step.
+ * Undoes the last step. Returns the state before it (`moment`) and the new history; null if there is
+ * no step.
  */
 export function undone<T>(
   { past, future }: History<T>,
@@ -80,7 +80,8 @@ export function undone<T>(
 }
 
 /**
- * Redoes the last undone step. Returns its moment and the history then; null if there is no step.
+ * Redoes the last undone step. Returns the state after it (`moment`) and the new history; null if
+ * there is no undone step.
  */
 export function redone<T>(
   { past, future }: History<T>,

@@ -31,7 +31,7 @@ export type ActionRules<A> = Readonly<{
  *   }
  * }
  *
- * // One switch, with a row in the panel and the name `grid` in a link.
+ * // A switch that shows a grid of lines, with a row in the panel and the name `grid` in a link.
  * const GRID: SwitchParameter<Readonly<{ hasGrid: boolean }>> = {
  *   kind: "switch",
  *   id: "grid",

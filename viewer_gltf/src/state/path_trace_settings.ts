@@ -142,7 +142,13 @@ export const POST_NUMBERS = {
     text: percent,
     about: "How dark corners and hollows appear.",
   },
-  sharpness: { label: "Sharpness", start: 0.2, limits: [0, 2], text: percent },
+  sharpness: {
+    label: "Sharpness",
+    start: 0.2,
+    limits: [0, 2],
+    text: percent,
+    about: "How strongly edges in the finished picture are sharpened. 0 % leaves them as they are.",
+  },
 } as const satisfies TraceNumbers;
 
 /**

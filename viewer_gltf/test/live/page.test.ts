@@ -118,7 +118,7 @@ describeInChromium("a source that is built behind the page", () => {
     expect(Math.max(...moved)).toBeLessThan(0.002);
     expect(after.state.channels[0].color[1]).toBeGreaterThan(after.state.channels[0].color[0]);
     expect(await page.locator("#app").count()).toBe(1);
-    expect(await page.locator("canvas").count()).toBeLessThanOrEqual(2); // one of the view, and one of the axes
+    expect(await page.locator("canvas").count()).toBeLessThanOrEqual(2); // a canvas for the view, and one for the axes
     const last = await takePicture(page);
     const [r, g, b] = last.at(last.width / 2, last.height / 2);
     expect(g).toBeGreaterThan(Math.max(r, b));

@@ -166,10 +166,10 @@ describeInChromium("the panel in the scene", () => {
     ) => {
       if (by === "gaze") {
         await hands().lookAt(await at(...from));
-        await hands().tap(); // begins the drag
+        await hands().tap(); // the first tap begins the drag
         await hands().lookAt(await at(...to));
         await hands().wait(0.2);
-        await hands().tap(); // ends the drag
+        await hands().tap(); // the second tap ends it
         return;
       }
       await hands().point("right", RIGHT, await at(...from));

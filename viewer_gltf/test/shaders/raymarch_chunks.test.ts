@@ -308,7 +308,7 @@ describeInChromium("the shader chunks", () => {
       expectEnds(await at(255, 255, 255, 255), near, far, 1);
       expectEnds(await at(200, 240, 255, 200), near, far, 1); // the farthest neighbour counts
       expectEnds(await at(200, 255, 240, 200), near, far, 1);
-      expectEnds(await at(100, 100, 100, 100), near, near, 0); // nearer neighbours do not count
+      expectEnds(await at(100, 100, 100, 100), near, near, 0); // neighbouring pixels nearer to the eye do not count
     });
 
     it("and does not take the slope of one surface for a silhouette", async () => {
@@ -456,7 +456,7 @@ describeInChromium("the shader chunks", () => {
       // The direction is slightly off the axis, so that rounding does not decide the side.
       const edgewise = [-1e-5, 0, -1];
       const steep = (step: number) => lit([-step, 0, 0], edgewise, [-1, 0, 1]); // over 1 um
-      const even = 1.2 * (AMBIENT + DIFFUSE * Math.SQRT1_2); // as for a boundary that faces the eye
+      const even = 1.2 * (AMBIENT + DIFFUSE * Math.SQRT1_2); // the light on a boundary that faces the eye
       expect(await steep(0)).toBeCloseTo(even, 4);
       expect(await steep(0.03)).toBeCloseTo(even, 4);
       expect(await steep(0.105)).toBeCloseTo((even + AMBIENT) / 2, 3); // half-way

@@ -82,7 +82,7 @@ describeInChromium("correct stereo", () => {
     const depth = XR_DISTANCE_M - (min[2] + at * (max[2] - min[2]) - center[2]) * scale;
     const perMetre = FOCAL_PX / depth;
     const columns = EYES.map(([, side], i) => {
-      // the upper and lower middle of each half of the slice, where there are no lines or letters
+      // Pixels are compared at 1/4 and 3/4 of the slice's height, where it has no lines or letters.
       const [a, b] = [shown[i], without[i]];
       const differs = (x: number, y: number) =>
         a.at(x, y).some((v, k) => Math.abs(v - b.at(x, y)[k]) > 8);

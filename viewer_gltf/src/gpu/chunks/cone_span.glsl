@@ -15,7 +15,7 @@ vec2 coneSpan(vec2 span, vec3 eye, vec3 dir) {
   float near = (-b - root) / a;
   float far = (-b + root) / a;
   if (a > 0.0) return dg > 0.0 ? vec2(max(span.x, far), span.y) : vec2(span.x, min(span.y, near));
-  // a < 0: near > far, and the ray is inside between them, either in front of the apex or behind it
+  // a < 0: far < near. From far to near the ray is inside the cone, or inside its mirror image behind the apex.
   if (mg + 0.5 * (near + far) * dg < 0.0) return vec2(1.0, 0.0);
   return vec2(max(span.x, far), min(span.y, near));
 }

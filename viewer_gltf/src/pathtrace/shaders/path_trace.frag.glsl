@@ -36,7 +36,7 @@ uniform sampler2D uEnvironment;
 uniform sampler2D uAliases;
 uniform float uEnvironmentLight;  // factor
 uniform int uLampCount;
-uniform vec4 uLamps[3];  // um, box: centre, radius
+uniform vec4 uLamps[3];  // um, from the box's low corner: centre of a sphere, and its radius
 uniform vec3 uLampLight[3];  // radiant intensity, um^2: irradiance is this by squared distance
 uniform int uScatters;  // largest number of scatterings of a path ...
 uniform vec3 uBeyond;  // ... after which it receives this radiance

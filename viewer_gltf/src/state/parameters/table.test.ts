@@ -116,6 +116,6 @@ describe("a number's slider", () => {
     if (density === undefined) throw new Error("no number of the density");
     const at = (share: number) => valueAtShare(density, share);
     expect(at(0.5) / at(0.25)).toBeCloseTo(at(0.75) / at(0.5), 4);
-    expect(at(0.5)).toBeCloseTo(1, 4); // the limits are 0.05 and 20
+    expect(at(0.5)).toBeCloseTo(1, 4); // the middle of the limits 0.05 and 20 on a logarithmic scale
   });
 });

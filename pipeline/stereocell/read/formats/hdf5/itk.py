@@ -47,8 +47,8 @@ def itk_image(tree: Hdf5Tree, dataset: h5py.Dataset, notes: tuple[str, ...]) -> 
         axes = (*axes, "c")
     if dataset.ndim != len(axes) or (len(axes) > rank and dataset.shape[-1] > MAX_CHANNELS):
         raise SourceError(
-            f"{where}: found voxels {dataset.shape} for {rank} dimensions, expected at most one "
-            f"further axis of up to {MAX_CHANNELS} values"
+            f"{where}: found an array of shape {dataset.shape} for an image of {rank} dimensions, "
+            f"expected {rank} axes, or one more with at most {MAX_CHANNELS} channels"
         )
     affine = _affine(tree, dataset, rank)
     unit = settle(_UNIT, [Statement("mm", "as in files of ITK", Trust.ASSUMED)]).notes

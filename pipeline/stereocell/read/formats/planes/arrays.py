@@ -46,12 +46,12 @@ class PlaneArray:
 
 
 class StackArray:
-    """Files that are each a stack, (t, c, z, y, x).
+    """Files that are each a stack of planes, together as one array (t, c, z, y, x).
 
-    shape  (t, c, z, y, x) in voxels
+    shape  (t, c, z, y, x) of all files together, in voxels
     dtype  dtype that holds the values of all files
     open_  returns the image of the file at (t, c)
-    inner  True: a file holds several channels, and c counts these
+    inner  True: the file of a time point holds all channels, and `open_` is called with c = 0
     """
 
     def __init__(
