@@ -67,9 +67,14 @@ async function click(viewer: ViewerPage, across: number, down: number): Promise<
 /** Opens a section of the panel and scrolls its heading to the upper end of the panel. */
 async function show(viewer: ViewerPage, section: string): Promise<void> {
   await viewer.unfold(section);
-  await viewer.page
-    .locator(`h2 [data-opener="${section}"]`)
-    .evaluate((heading) => heading.scrollIntoView({ block: "start" }));
+  await viewer.page.locator(`h2 [data-opener="${section}"]`).evaluate((heading) => {
+    // scrollIntoView() would scroll the page as well
+    const section = heading.closest("section") ?? heading;
+    let list = section.parentElement;
+    while (list !== null && list.scrollHeight <= list.clientHeight) list = list.parentElement;
+    const past = heading.getBoundingClientRect().top - (list?.getBoundingClientRect().top ?? 0);
+    list?.scrollBy(0, past);
+  });
   await viewer.settled();
 }
 

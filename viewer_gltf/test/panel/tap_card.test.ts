@@ -53,6 +53,12 @@ describeInChromium("the card beside a tapped place", () => {
     if (channel === undefined) throw new Error(`no channel is called ${title}`);
     const now = async () => (await state()).channels.find(({ id }) => id === channel.id);
     expect(await card().textContent()).toContain("Tile in row 1, column 1");
+    const cutOff = await card()
+      .locator("button")
+      .evaluateAll((all) =>
+        all.filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.textContent),
+      );
+    expect(cutOff).toEqual([]);
 
     await card().locator("[data-color]").nth(3).click();
     expect((await now())?.color).not.toEqual(channel.color);
