@@ -436,7 +436,8 @@ def test_moved_points_are_carried_with_their_extent_normals_and_tangents(
     far = ~np.isin(
         np.arange(len(before)), triangles[(before != after).any(axis=1)[triangles].any(axis=1)]
     )
-    # Along a UV seam, the copies of a changed vertex are changed as well.
+    # A vertex beside a moved one gets another normal, and so do its copies along a UV seam. The
+    # copies may lie in other triangles, so no vertex near the edge of the moved part is compared.
     far &= (before[:, 1] < top - 1) | (before[:, 1] > top + 1)
     assert far.any()
     assert np.array_equal(normals[far], kept[far])

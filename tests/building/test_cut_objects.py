@@ -217,7 +217,10 @@ def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
 def test_objects_that_are_too_thin_are_reported_and_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], is_alone: bool
 ) -> None:
-    """The label map is noise beside a cell, or only noise, so that no object is left."""
+    """Object 700 is noise, which a build leaves out.
+
+    The label map holds it beside a cell, or alone; then the build has no object.
+    """
     labels = np.zeros((16, 40, 40), np.uint16)
     rng = np.random.default_rng(1)
     labels[:, :, 20:] = rng.integers(0, 2, (16, 40, 20)) * 700

@@ -66,7 +66,7 @@ def run(cases: list[Case], folder: Path, options: argparse.Namespace) -> list[tr
 
 
 def build(base: Path) -> None:
-    """Build v5.zarr into base/out."""
+    """Build v5.zarr, an OME-Zarr 0.5 of two channels, into base/out."""
     os.chdir(base)
     with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
         codes = [trial.run_command(command) for command in BUILD]

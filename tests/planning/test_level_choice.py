@@ -1,4 +1,4 @@
-"""The choice of a channel's level, and the reasons to call it unsure."""
+"""The choice of the iso-value of a channel's surface, and the reasons to call it unsure."""
 
 import json
 from pathlib import Path

@@ -239,7 +239,7 @@ def test_a_pattern_explains_the_names(tmp_path: Path) -> None:
         ("(((", "none of 3 files matches"),
     ],
 )
-def test_a_pattern_that_fits_nothing_is_refused(
+def test_a_pattern_that_is_invalid_or_matches_no_file_is_refused(
     tmp_path: Path, pattern: str, expected: str
 ) -> None:
     folder = fill(tmp_path, {f"x_z{z}.tif": volume(4, 4) for z in range(3)})

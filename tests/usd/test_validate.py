@@ -170,7 +170,8 @@ def test_a_volume_of_two_files_is_found(stage_path: Path, tmp_path: Path) -> Non
     path = leaf("r0_c1", F_ID, "_volume") + "/density"
     findings = edit_volume(stage_path, tmp_path, f"rel field:second = <{path}>")
     assert any(
-        "found 2 files, expected 1, since programs read only one" in text for text in findings
+        "fields name 2 VDB files, expected 1, since programs read only one" in text
+        for text in findings
     )
 
 

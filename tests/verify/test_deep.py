@@ -275,7 +275,8 @@ def test_a_build_agrees_with_its_source_and_its_bundle(
     printed = capsys.readouterr().out
     assert "ok   F lod0 against source: 2 surfaces within " in printed
     assert (
-        "ok   F against source: 2 units: surfaces as stated, volumes equal to the source" in printed
+        "ok   F against source: 2 units: surfaces within the stated distances, "
+        "volumes equal to the source" in printed
     )
     assert "2 volumes, all voxels of all resolution levels" in printed
     found = lines_of(built)["F lod3 against source"].detail.split()

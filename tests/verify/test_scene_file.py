@@ -47,7 +47,10 @@ def failures(document: str, folder: Path, capsys: pytest.CaptureFixture[str]) ->
 
 
 def with_block(scene: str, path: str, name: str, data: bytes, is_packed: bool = False) -> str:
-    """Return a scene with another block in the place of a file's."""
+    """Return a scene in which another block replaces a file's, or none if `name` is empty.
+
+    A block is a script element of the page; it holds one file of the bundle.
+    """
     found = re.search(rf' *<script [^>]*data-file="{re.escape(path)}".*?</script>\n', scene)
     assert found
     return scene.replace(found[0], block(FILE, name, data, is_packed) if name else "")

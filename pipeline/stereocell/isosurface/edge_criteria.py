@@ -37,7 +37,9 @@ DIM_PERCENTILE = 40.0
 CHI = 0.789
 EDGES_SHARE = 0.70  # share of the largest total, 0..1, that a level needs to be chosen
 PEAK_SHARE = 0.75  # share of the best score, 0..1; a parabola is fitted to the scores above it
-_SMOOTHING = 0.03  # sigma as a share of the number of levels: bins with few voxels are noisy
+# Sigma of the Gaussian over the levels, as a share of their number. Each level sums a bin of voxel
+# values, and a bin with few voxels is noisy.
+_SMOOTHING = 0.03
 
 
 @dataclass(frozen=True, slots=True)

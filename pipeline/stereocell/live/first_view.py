@@ -40,7 +40,9 @@ OBJECTS_NOT_BUILT = "its objects are not built yet"
 def read_channels(
     plan: Plan, dataset: Dataset, on_read: OnRead = lambda share: None
 ) -> dict[str, CoarseChannel]:
-    """Return the coarse voxels of a plan's channels, by the ID of their voxels.
+    """Return the coarse voxels of a plan's channels, by `Channel.voxels_id`.
+
+    Two surfaces of one channel of the source share that ID, so their voxels are read once.
 
     on_read  called from any thread after each part that is read, with the part's share, 0..1
 

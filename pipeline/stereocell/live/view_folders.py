@@ -1,4 +1,8 @@
-"""Number the folders of a source's views, `g1`, `g2`, ..., so that older views stay usable."""
+"""Number the folders of a source's views, `g1`, `g2`, ...
+
+A view is a bundle that is served before or during a build. Each one gets a folder of its own, so
+that pages that opened an older one still find its files.
+"""
 
 import re
 from pathlib import Path

@@ -290,7 +290,7 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
             message = f"found no OpenVDBAsset at {path}, expected one for the field {name}"
             yield Finding("volume", where, message)
     if len(files) > 1:
-        message = f"found {len(files)} files, expected 1, since programs read only one"
+        message = f"fields name {len(files)} VDB files, expected 1, since programs read only one"
         yield Finding("volume", where, message)
     low, high, size, apron = _box_of(prim)
     if low is None or high is None or size is None:

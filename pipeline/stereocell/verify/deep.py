@@ -202,7 +202,10 @@ def _channel_lines(
         tiles = {unit.name.split("/")[0] for unit in units}
         noise = sum_lifted(lifted[tile] for tile in tiles & set(lifted))
         shares = f"; {SurfaceCover.of(total, noise).words}" if total.source else ""
-        return f"{len(units)} units: surfaces as stated, volumes equal to the source{shares}"
+        return (
+            f"{len(units)} units: surfaces within the stated distances, "
+            f"volumes equal to the source{shares}"
+        )
 
     yield _line(f"{channel.name} against source", sum_up)
 

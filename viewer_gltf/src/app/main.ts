@@ -35,7 +35,7 @@ function checkWebGl2(): void {
   );
 }
 
-/** Returns the size of the specimen, for example `512 x 205 x 54 um` or `231 x 215 x 255 mm`. */
+/** Returns the specimen's size and number of tiles, for example `512 x 205 x 54 um · 2 tiles`. */
 function describeSize({ specimen, tiles }: Manifest): string {
   const { min, max } = specimen.bounds_um;
   return `${sizeText(max.map((v, i) => v - min[i]))} · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;

@@ -26,7 +26,10 @@ export type CameraPose = Readonly<{
 /** Shares of the image's height, at its top and bottom, that are covered by other elements. */
 export type Covered = Readonly<{ top: number; bottom: number }>;
 
-/** Largest share of the image's height that is left out when the opening is framed. */
+/**
+ * Largest share of the image's height, 0..1, that is counted as covered by buttons and texts when
+ * the opening view is framed.
+ */
 const MOST_COVERED = 0.6;
 
 export class NamedViews {

@@ -26,8 +26,9 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
     [OWN]: "The shapes that you drew in the joint histogram of value and gradient.",
   },
   tool: {
-    select: "Opens a card that names the structure, with buttons to hide, recolour or isolate it.",
-    measure: "Adds a point to a length, an angle or a line.",
+    select:
+      "A tap opens a card that names the structure, with buttons to hide, recolour or isolate it.",
+    measure: "A tap adds a point to a length, an angle or a line.",
   },
   "measure-kind": {
     distance: "The length between two points.",

@@ -77,7 +77,7 @@ export function listenForKeys(onKey: (name: string) => boolean, signal: AbortSig
       if (firesOn(name, focus)) {
         if (onKey(name)) event.preventDefault();
       } else if (focus === "field" && name === "Escape" && target instanceof HTMLElement) {
-        target.blur(); // the typed text stays
+        target.blur(); // Escape leaves the field; the typed text stays
         event.preventDefault();
       }
     },

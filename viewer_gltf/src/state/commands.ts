@@ -68,4 +68,5 @@ export const UNCHANGED_VIEW: Partial<Record<Command, string>> = {
 };
 
 /** Announcement when the viewer cannot do what was requested. */
-export const UNAVAILABLE = "This viewer can't do that here.";
+export const UNAVAILABLE =
+  "This command is not available for this specimen, in this browser, or in stereo.";

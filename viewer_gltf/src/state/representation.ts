@@ -76,7 +76,7 @@ export function marchedTile(state: ViewerState, focusTiles: FocusTiles): string 
   return state.mode === "tile" && tile !== null && focusTiles.near.has(tile) ? tile : null;
 }
 
-/** Returns whether the volumes of a channel are drawn only in the focus disc. */
+/** Returns whether a channel's volumes are drawn only in the focus disc, round the middle of the view. */
 export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
   return state.mode === "disc" && !prefersVolume(channel) && !isUnfinished(state);
 }

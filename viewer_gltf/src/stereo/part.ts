@@ -189,7 +189,7 @@ class StereoPart implements Part, StereoFinder {
       rememberScreen(perInch);
       display.setScreen(perInch);
       host.announce(
-        `The screen has ${perInch} pixels per inch. Split the screen to see it in true size.`,
+        `The screen has ${perInch} pixels per inch. The split screen now shows the specimen at the right size.`,
       );
     });
     const { userAgent } = navigator;

@@ -1,4 +1,7 @@
-/** The decoders that a glTF file needs, read from its JSON before the whole file is parsed. */
+/**
+ * The decoders that a glTF file needs (meshopt, Basis Universal), read from its JSON before the
+ * whole file is parsed.
+ */
 
 /**
  * glTF 2.0, section 4.4: a glb has a header of 12 bytes, then chunks; the first one is the JSON.

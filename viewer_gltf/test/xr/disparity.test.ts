@@ -1,6 +1,6 @@
 /**
- * Correct stereo: a known point lies where the geometry of the two eyes puts it, in both kinds of
- * stereo.
+ * Correct stereo in a headset: a known point of a surface, a volume or a slice lies in each eye's
+ * image where the geometry of that eye puts it.
  */
 import { expect, it } from "vitest";
 import { place, XR_DISTANCE_M } from "../../src/render/placement";

@@ -164,7 +164,7 @@ void main() {
   vec3 texPerUm = (uTexHigh - uTexLow) / uSize;
   vec3 texStart = uTexLow + start * texPerUm;
   vec3 texDir = dir * texPerUm;
-  vec3 brickStart = texStart * uTexels / float(SKIP_BRICK);  // the same ray in bricks
+  vec3 brickStart = texStart * uTexels / float(SKIP_BRICK);  // the same ray, in units of bricks
   vec3 brickDir = texDir * uTexels / float(SKIP_BRICK);
   brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
   vec3 invBrickDir = 1.0 / brickDir;

@@ -18,9 +18,10 @@ _OF_SPACE = tuple("xyz")
 
 
 def labelled_axes(fields: Mapping[str, Any], sizes: Sequence[int]) -> tuple[str, ...]:
-    """Return an axis for each label, fastest first, as t, c, z, y, x or another text.
+    """Return an axis for each label, fastest first: t, c, z, y or x.
 
-    Empty: no label names an axis of space, or two labels name the same axis.
+    A label that means none of them stays, in lower case. The result is empty if no label names an
+    axis of space, or if two labels name the same one.
     """
     labels = [str(label).strip(' "') for label in fields.get("labels", ())][: len(sizes)]
     axes = axes_of_names(labels)

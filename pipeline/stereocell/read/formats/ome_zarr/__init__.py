@@ -60,7 +60,7 @@ FORMAT = Format(
         ),
         Guide(
             "Zarr 2 and 3",
-            "the folder of an array, or of a group of one",
+            "the folder of an array, or of a group that holds one array",
             "[N5 and plain Zarr](input-zarr-n5.md)",
         ),
     ),
