@@ -49,7 +49,7 @@ def test_a_large_object_is_cut_at_tile_borders_and_stays_one_object(
     # for a label map with more voxels the plan states the limit without reading it
     monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 1000)
     assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
-    words = "40 x 80 x 80 um (z, y, x), a tile and half a tile around it, will be cut"
+    words = "(z, y, x), the tile and what is read around it, are cut at tile borders"
     assert words in printed(capsys)
     folder = out / "bundle/channels/organs"
     content = objects_of(out, "organs")

@@ -172,7 +172,7 @@ def test_the_error_for_measured_voxels_of_a_damaged_file_is_one_line(tmp_path: P
             assert found.shape == measured.shape
     assert 20 < refused < 300
     write_vdb(path, np.zeros((4, 4, 4), np.uint8), first_um=(0, 0, 0), spacing_um=SPACING_UM)
-    with pytest.raises(StageError, match=r"a\.vdb: no grid 'measured' of floats"):
+    with pytest.raises(StageError, match=r"a\.vdb: found no grid 'measured' of floats"):
         VdbValues(path, "measured")
 
 

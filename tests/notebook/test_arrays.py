@@ -74,7 +74,11 @@ def test_xarray_s_units_are_lengths_and_its_channels_have_names(tmp_path):
         (np.zeros((4, 4)), {}, r"has 2 axes \(4 x 4\), expected \(z, y, x\) or \(c, z, y, x\)"),
         (np.zeros((3, 9, 9)), {}, "3 x 9 x 9 voxels, expected at least 4 along z, y and x"),
         (np.zeros((4, 4, 4), complex), {}, "type is complex128"),
-        (np.zeros((4, 4, 4)), {"spacing_um": None}, "no voxel spacing; pass it as spacing_um="),
+        (
+            np.zeros((4, 4, 4)),
+            {"spacing_um": None},
+            "states no voxel spacing, expected one: pass it as spacing_um=",
+        ),
         (np.zeros((4, 4, 4)), {"spacing_um": (1, 0, 1)}, "each above 0"),
         (np.zeros((4, 4, 4)), {"spacing_um": (1, 1)}, "expected z, y, x in um"),
         (np.zeros((4, 4, 4)), {"spacing_um": 2}, "spacing_um is 2, expected z, y, x in um"),
@@ -86,7 +90,11 @@ def test_xarray_s_units_are_lengths_and_its_channels_have_names(tmp_path):
             {},
             r"19,200,000,000,000 voxels .* at most 1,073,741,824 .*`stereocell build",
         ),
-        (of_xarray(np.zeros((4, 4, 4)), dims=("x", "y", "z")), {}, "axes are x, y, z.*Transpose"),
+        (
+            of_xarray(np.zeros((4, 4, 4)), dims=("x", "y", "z")),
+            {},
+            "axes are x, y, z, expected z, y, x: transpose",
+        ),
         (
             of_xarray(np.zeros((4, 4, 4)), z=(0, 1, 2, 9)),
             {"spacing_um": None},

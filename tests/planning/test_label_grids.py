@@ -141,7 +141,9 @@ def test_labels_without_a_size_lie_on_the_level_of_their_shape(tmp_path: Path) -
         tifffile.imwrite(tmp_path / "l.tif", voxels, metadata={"axes": "ZYX"})
         found = lay(whole, tmp_path / "l.tif")
         assert found.labels[0].spacing_um == tuple(scales[number])
-        assert f"is assumed, as level {number} of the image has as many" in found.notes[0]
+        assert (
+            f"is assumed, as resolution level {number} of the image has as many" in found.notes[0]
+        )
     tifffile.imwrite(tmp_path / "l.tif", NUMBERS.transpose(2, 1, 0), metadata={"axes": "ZYX"})
     with pytest.raises(SourceError, match="its axes are in another order; save it as"):
         lay(whole, tmp_path / "l.tif")

@@ -389,5 +389,5 @@ def test_lost_blocks_of_a_view_are_counted(
         input_files.forget()
         capsys.readouterr()
         assert main(["plan", str(source), "-o", str(tmp_path / "o"), "--as", "intensity"]) == 0
-        assert "1 of 48 blocks of level 0" in capsys.readouterr().err
+        assert "1 of 48 blocks of resolution level 0" in capsys.readouterr().err
         shutil.rmtree(tmp_path / "o")

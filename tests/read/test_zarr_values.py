@@ -80,4 +80,4 @@ def test_lost_chunks_of_scaled_voxels_are_counted(
     input_files.forget()
     plan = ["plan", str(path), "-o", str(tmp_path / "o"), "--spacing-um", "1,1,1"]
     assert main([*plan, "--as", "intensity"]) == 0
-    assert "1 of 8 chunks of level 0" in capsys.readouterr().err
+    assert "1 of 8 chunks of resolution level 0" in capsys.readouterr().err

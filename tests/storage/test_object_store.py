@@ -432,14 +432,18 @@ def test_showing_a_build_fetches_only_its_bundle(
         ),
         (["iso", "x.nii", "-o", "s3://a:b@c/x", "--channel", "0", "--tile", "r"], 2, "s3://c/x"),
         (["units", "s3://nowhere/out"], 1, "s3://nowhere/out/.lock: "),
-        (["slices", "x.nii", "-o", "s3://bucket/x"], 2, "expected a folder or file of this"),
-        (["sample", "mri", "s3://bucket/x"], 2, "expected a folder or file of this"),
+        (
+            ["slices", "x.nii", "-o", "s3://bucket/x"],
+            2,
+            "expected a folder or a file on this machine",
+        ),
+        (["sample", "mri", "s3://bucket/x"], 2, "expected a folder or a file on this machine"),
         (
             ["iso", "x.nii", "--channel", "0", "--tile", "r0_c0", "-o", "s3://bucket/x.png"],
             2,
-            "expected a folder or file of this",
+            "expected a folder or a file on this machine",
         ),
-        (["bundle", "s3://bucket/x", "--stage", "my.usda"], 2, "/x is on object storage, expected"),
+        (["bundle", "s3://bucket/x", "--stage", "my.usda"], 2, "/x, on object storage, expected"),
         (["units", "nothing://x"], 1, "nothing://x: Protocol not known: nothing"),
     ],
 )

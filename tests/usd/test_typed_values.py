@@ -167,12 +167,14 @@ def test_a_bundle_without_channels_is_refused(
     channels = stage.GetPrimAtPath("/Specimen/Channels").GetChildren()
     each = "\n".join(f'over "{prim.GetName()}" (active = false) {{}}' for prim in channels)
     none = edited("/Specimen/Channels", each)
-    expected = "expected one or more: activate one"
-    line = f"{layer}: found no active channel below /Specimen/Channels, {expected}"
+    line = (
+        f"{layer}: found no active channel below /Specimen/Channels, expected one or more: "
+        "activate one"
+    )
     assert refusal_of_bundle(none, tmp_path) == line
     with pytest.raises(StereoCellError) as raised:
         export_stage(none, tmp_path / "s.glb", options=ExportOptions())
-    assert str(raised.value) == expected
+    assert str(raised.value) == line
 
 
 def test_usd_prints_no_warnings_of_its_own(
