@@ -325,7 +325,7 @@ torture: setup ## Kill 50 builds, spread over all phases, and build all malforme
 careless: setup browser ## Use a bundle's page carelessly by script for ten minutes:  [OUT=out/demo] (figures in out/careless.json)
 	out="$$(realpath -- "$$OUT")" && report="$$PWD/out/careless.json" && cd $(VIEWER) && \
 	  STEREOCELL_TEST_BUNDLE="$$out/bundle" STEREOCELL_CARELESS_S=600 STEREOCELL_CARELESS_REPORT="$$report" \
-	  npm exec --silent -- vitest run --project built test/page/careless.built.test.ts -t asked
+	  npm exec --silent -- vitest run --project built test/page/careless.built.test.ts -t "changes only"
 
 bench: setup ## Compare pairs of alternatives in one run (ratios of medians)
 	$(BIN)/python tests/bench/bench.py
