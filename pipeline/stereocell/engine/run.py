@@ -74,7 +74,7 @@ class Engine:
         self.watch: Watch = watch or (lambda *_: None)
         self._scheduler = scheduler
         self._shared = shared
-        self._client: Any = None  # of the cluster
+        self._client: Any = None  # client of the cluster; None: no cluster has been joined
         self._pool: WorkerPool | None = None
 
     def join(self) -> None:

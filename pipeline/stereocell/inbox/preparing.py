@@ -114,7 +114,7 @@ def write_first_view(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBu
 
 
 def _live_of(page: Path, bundle: Path, tiles: ItemTiles, build: ItemBuild) -> Live:
-    """Return a view whose files are already written."""
+    """Return a first view whose files are already written, in the form that LiveApp serves."""
     first: Future[None] = Future()
     first.set_result(None)
     return Live(page, bundle, first, tiles, build, Reading(lambda _: None))

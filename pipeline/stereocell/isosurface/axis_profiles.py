@@ -28,7 +28,7 @@ _BLUR = 8
 
 @dataclass(frozen=True, slots=True)
 class Profiles:
-    """Sums over a tile's voxels in each plane across an axis. Padding is left out.
+    """Sums over a tile's voxels in each plane perpendicular to an axis. Padding is left out.
 
     start   voxels (z, y, x) at which the tile begins
     sums    float64, sums of the values by z, by y and by x
@@ -79,7 +79,10 @@ def share_of_light(
 
 
 def _means(tiles: Sequence[Profiles], axis: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the mean and the number of voxels of each plane across an axis that has voxels."""
+    """Return the mean and the number of voxels of each plane at right angles to an axis.
+
+    Planes without counted voxels are left out.
+    """
     length = max(tile.start[axis] + len(tile.sums[axis]) for tile in tiles)
     sums, counts = np.zeros(length), np.zeros(length)
     for tile in tiles:

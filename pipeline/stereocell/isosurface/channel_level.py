@@ -1,4 +1,4 @@
-"""Find the levels of a channel's surfaces: one set of levels for all tiles of the dataset.
+"""Find the iso-levels of a channel's surfaces: one set of levels for all tiles of the dataset.
 
 The levels are ordered from the outermost to the innermost: air and skin, then skin and bone;
 ground and tissue, then tissue and cells. They are found on histograms that are summed over the
@@ -95,10 +95,10 @@ class ChannelLevels:
     has_padding  whether padding was found and left out
     noise        sigma of the denoised field, voxel values
     finest_um    the finest voxel spacing
-    sums         of the field, or of the field above the background
-    histogram    of the field, or of the field above the background
+    sums         sums over the voxels of the field, or of the field above the background
+    histogram    histogram of the same values
     light        share of the variance, 0..1, that lies along the axes alone; see axis_profiles.py
-    correlation  of neighbouring voxels as read; see neighbours.py
+    correlation  correlation of neighbouring voxels as read; see neighbours.py
     """
 
     all_levels: tuple[Level, ...]
@@ -154,7 +154,7 @@ class ChannelLevels:
     def judge(self, value: float) -> Level:
         """Return a level that was found by other means, with its measures.
 
-        value  of the level, in voxel values
+        value  voxel value of the level
         """
         valleys = self._field.histogram.find_valleys(self.noise)
         dips = [valley.dip for valley in valleys if valley.low <= value <= valley.high]

@@ -60,7 +60,7 @@ class TileEvidence:
     padding      sums of the denoised field over the padding
     above        sums of the field above the background; None: the channel has no background
     differences  int64 (NOISE_BINS,), counts of differences between voxels LAG apart along a row
-    profiles     along the axes, of the field and of the field above the background
+    profiles     sums along the axes, of the field and of the field above the background
     neighbours   sums over neighbouring voxels as read
     edges        of the field and of the field above the background, if a criterion scores edges
     """

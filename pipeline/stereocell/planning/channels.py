@@ -53,8 +53,8 @@ class Channel:
     source       source of this channel alone, which a command added to the plan. It has only the
                  planned level, and voxels in uint8 with the window 0..255. Empty: the plan's source
     fingerprint  fingerprint of that source
-    level        which of the found levels has the surface (`inner`), or a voxel value (`162`), or
-                 a value above the background (`162+b`); empty: the settings decide
+    level        iso-level of the surface: the name of a found level (`inner`), a voxel value
+                 (`162`), or a value above the background (`162+b`); empty: the settings decide
     base         name of the source's channel, if it has several surfaces and this is one of them;
                  empty: `name` is the source's channel
     """

@@ -13,8 +13,10 @@ from stereocell.steps.open_source import SourceRef, open_source
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
 
-_first: dict[SourceRef, FileStates] = {}  # by reference, without the fingerprint
-_tables: dict[str, FileStates] = {}  # by the path in the settings
+# States of files when this process first opened them: of sources, by their reference without the
+# fingerprint, and of tables, by their path in the settings.
+_first: dict[SourceRef, FileStates] = {}
+_tables: dict[str, FileStates] = {}
 
 
 def as_asked(source: str, options: PlanOptions, *, fingerprint: str = "") -> SourceRef:

@@ -1,4 +1,4 @@
-"""Choose the level of a channel's surface: the given one, one that was found, or a threshold."""
+"""Choose the iso-level of a channel: the given one, one that was found, or a threshold."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -19,7 +19,7 @@ from stereocell.planning.plan import Plan
 from stereocell.steps.labels import Labels
 
 AROUND = 0.5  # tiles; farthest that an uncut object reaches beyond its tile
-HALO = 42  # voxels; anything farther from an interface moves it by less than the lattice's step
+HALO = 42  # voxels; those farther from an interface move it by less than the lattice's step
 CUT = -1  # stands in place of a tile's index for an object that is cut
 
 

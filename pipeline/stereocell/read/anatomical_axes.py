@@ -29,8 +29,8 @@ _OBLIQUE = np.cos(np.radians(2.0))  # cosine; a normal farther from its axis mak
 class Canonical:
     """The map from stored axes to canonical ones.
 
-    order       stored axis that becomes z, y, x
-    flips       True where z, y, x run backwards along the stored axis
+    order       for z, y and x: index (0..2) of the stored axis that becomes this axis
+    flips       for z, y and x: True where the axis runs backwards along its stored axis
     spacing_um  (z, y, x), um
     placement   rows of a (4, 4) matrix for column vectors, um: from the pipeline's world, whose
                 origin is the centre of canonical voxel (0, 0, 0), to the patient's world
@@ -42,7 +42,7 @@ class Canonical:
     placement: Matrix
 
     def apply(self, voxels: NDArray[np.generic]) -> NDArray[np.generic]:
-        """Return stored voxels (three axes, any dtype) as a canonical view (z, y, x)."""
+        """Return stored voxels (three axes, any dtype) on canonical axes (z, y, x), not copied."""
         turned = voxels.transpose(self.order)
         return turned[tuple(slice(None, None, -1 if flip else 1) for flip in self.flips)]
 
@@ -55,7 +55,7 @@ def canonical_of(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> Ca
     """
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     axes = affine[:3, :3] / spacing
-    likeness = _CANONICAL @ axes  # absolute cosines; rows: canonical axes, columns: stored axes
+    likeness = _CANONICAL @ axes  # signed cosines; rows: canonical axes, columns: stored axes
     best = max(permutations(range(3)), key=lambda p: sum(abs(likeness[i, p[i]]) for i in range(3)))
     order = (best[0], best[1], best[2])
     backwards = [bool(likeness[i, axis] < 0) for i, axis in enumerate(order)]

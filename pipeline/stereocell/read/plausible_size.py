@@ -15,7 +15,7 @@ def ratio_notes(spacing_um: Sequence[float], slice_axis: int) -> tuple[str, ...]
     """Return a note if voxels are implausibly longer along one axis than along another.
 
     spacing_um  (z, y, x)
-    slice_axis  index of z, y, x: the axis across which the images lie
+    slice_axis  0, 1 or 2 for z, y or x: the axis that is perpendicular to the images
     """
     rows, columns = (n for n in range(3) if n != slice_axis)
     long, short = sorted((rows, columns), key=lambda n: -spacing_um[n])

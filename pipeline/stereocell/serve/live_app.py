@@ -167,5 +167,5 @@ class LiveApp:
 
 
 def _first_of(path: str) -> str:
-    """Return the first part of a path, as `g1`."""
+    """Return the part of a path before its first slash, such as `g1`."""
     return path.lstrip("/").partition("/")[0]

@@ -1,7 +1,7 @@
 """Serve a built bundle and its bricks: `stereocell view` and `stereocell serve`.
 
 A static bundle works on any web host. This server adds three things to it. It answers byte ranges
-of files. Its websocket `/bricks` sends the parts of volumes that a view needs
+of files. Its websocket `/bricks` sends the parts of volumes that a camera needs
 (serve/brick_session.py). `/values` returns measured values from the stage beside the bundle
 (serve/measured_values.py).
 

@@ -169,7 +169,7 @@ def _fetch(client: WebClient, address: str, folder: Path) -> int:
 def _write(
     path: Path, first: bytes | None, rest: Iterator[bytes | None], shown: str, *, limit: int
 ) -> int:
-    """Write the pieces of one part up to None; return its number of bytes."""
+    """Write one part of an answer, whose pieces end with None, to a file; return its bytes."""
     size, piece = 0, first
     with open(path, "xb") as file:
         while piece is not None:

@@ -27,7 +27,7 @@ _MAX_LEVELS = 64
 
 
 class _Cells:
-    """The voxels of a view; int16 is read as the uint16 that it really holds."""
+    """The voxels of one setup at one time point; int16 is read as the uint16 that it holds."""
 
     def __init__(self, array: Hdf5Array) -> None:
         self.shape, self.chunks = array.shape, array.chunks

@@ -21,7 +21,8 @@ from stereocell.storage.location import is_own
 _MAX_FILES = 50  # XML files of a folder that are looked into
 _MAX_BYTES = 16 << 20
 _MAX_TIMES = 100_000
-_RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?(?::(\d{1,9}))?")  # first-last:step
+# Numbers of time points: `first`, `first-last` or `first-last:step`.
+_RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?(?::(\d{1,9}))?")
 
 
 def read_described(path: str, xml: str = "") -> Described:

@@ -81,7 +81,8 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         )
     stack = found.stacks[max(series, 1) - 1]
     if (segmentation := stack.first.segmentation) is not None:
-        if not series or segmentation.kind == LABELMAP:  # numbers of objects have no mean
+        # A LABELMAP's pixels are object numbers, which can't be averaged like one segment's mask.
+        if not series or segmentation.kind == LABELMAP:
             return _label_map(found, stack, series, location.shown)
         if stack.layout is None:
             raise _no_labels(stack, len(found.stacks), location.shown, stack.problem)

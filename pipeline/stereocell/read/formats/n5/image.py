@@ -5,7 +5,7 @@ source wherever a link leads, and unpacks blocks of any size. A block is simple:
 and 32-bit numbers, then one of the usual codecs. So this package decodes it itself.
 
 N5 lists axes fastest first, also in the paths of its blocks; here everything is reversed to z, y,
-x. An absent block is 0.
+x. The voxels of an absent block are read as 0.
 
 References: https://github.com/saalfeldlab/n5 (the specification in its README)
 """

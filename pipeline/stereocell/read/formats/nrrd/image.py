@@ -195,7 +195,8 @@ def _directions(
     """
     stated = fields.get("space directions")
     found = np.full((len(shape), 3), np.nan)
-    # only lengths are stated; the axes of space are the first three that have one
+    # Only lengths are stated. If `kinds` and labels name no axes of space, the first three axes
+    # with a length count as them.
     if stated is None:
         lengths = axis_lengths(fields, shape)
         kinds = list(fields.get("kinds", ()))

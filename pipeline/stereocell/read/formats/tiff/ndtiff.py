@@ -22,7 +22,7 @@ from stereocell.storage.location import Location, require_own
 
 INDEX = "NDTiff.index"
 _MAX_INDEX = 64 << 20  # bytes
-_MARK = struct.pack("<I", 483729)  # at byte 8 of each file of a set
+_MARK = struct.pack("<I", 483729)  # mark at byte 8 of each file of a set
 _MARK_AT = 8
 
 
