@@ -140,7 +140,7 @@ def _run(options: argparse.Namespace) -> int:
             from stereocell.storage.overwriting import AT_A_PROMPT, forcing
 
             stack.enter_context(forcing(options.force, AT_A_PROMPT))
-        if isinstance(out, str):  # an address
+        if isinstance(out, str):  # OUT is an address, not a local path
             if name not in WRITERS | READERS.keys():
                 from stereocell.storage.location import Location
 

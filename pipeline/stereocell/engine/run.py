@@ -117,7 +117,8 @@ class Engine:
                     advance(tasks[place][0], error is not None)
                     self.watch(label, len(results) + len(failures), len(tasks), tasks[place][0])
         except KeyboardInterrupt:
-            self.close()  # at once, or workers would write into folders that are being removed
+            # Workers end at once. Otherwise they would write into folders that are being removed.
+            self.close()
             raise
         if failures:
             named: dict[str, list[str]] = {}  # tasks that failed for the same reason share a line

@@ -134,7 +134,7 @@ def view_item(inbox: Inbox, item: Item, page: Path) -> str:
     if item.upload is None:
         raise RefusedError(409, "the upload was deleted: upload the files again")
     with item.reading:
-        if item.page:  # another request was first
+        if item.page:  # another request has written the view meanwhile
             return item.page
         if item.is_deleted:
             raise RefusedError(410, "the item was deleted")

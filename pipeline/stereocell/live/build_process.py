@@ -219,7 +219,7 @@ class BuildProcess:
                 report = pipe.recv()
             except (EOFError, OSError):
                 report = None
-            if pipe is not self._pipe:  # a newer process builds by now
+            if pipe is not self._pipe:  # this process has ended, and another one builds meanwhile
                 return
             if report is None:
                 is_over = self.state.doing in ("cancelled", "failed", "complete")

@@ -20,7 +20,7 @@ Doing = Literal[
     "cancelled",
     "failed",
     "complete",
-    "deleted",  # together with its source
+    "deleted",  # the build was deleted together with its source
 ]
 
 

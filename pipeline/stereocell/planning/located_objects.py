@@ -105,7 +105,7 @@ class Located:
         is_cut = self.owners[numbers] == CUT
         low[is_cut] = np.maximum(low[is_cut], own.start)
         high[is_cut] = np.minimum(high[is_cut], own.stop)
-        # objects end where the region does
+        # Voxels outside the region that is built are not read.
         first = [int(edges[0]) for edges in self.grid.edges]
         last = [int(edges[-1]) for edges in self.grid.edges]
         z0, y0, x0 = np.maximum(low.min(axis=0) - HALO, first).tolist()

@@ -120,7 +120,7 @@ def is_body(appearance: Appearance, statistics: ChannelStatistics) -> bool:
     return above >= BODY_SHARE * int(counts.sum())
 
 
-Survey = dict[str, ChannelSurvey]  # by channel ID
+Survey = dict[str, ChannelSurvey]  # the survey of each channel, by channel ID
 
 
 @cache

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from stereocell.model.rigid_transform import Matrix, to_matrix
 from stereocell.model.spacing import Spacing
 
-_CANONICAL = np.array([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])  # A, I, L in LPS
-LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])  # (3, 3) for columns
+# rows: directions of canonical z, y and x (anterior, inferior, left) in LPS
+_CANONICAL = np.array([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])
+# (3, 3) for column vectors: from LPS to the world
+LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])
 _UM_PER_MM = 1000.0
 _PLANES = ("sagittal", "coronal", "axial")  # indexed by the LPS axis nearest to the normal
 _OBLIQUE = np.cos(np.radians(2.0))  # cosine; a normal farther from its axis makes the plane oblique

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-_WIDEST_MM = 12.0  # mm between voxels; PET and SPECT have up to 10 mm
-_LEAST_MM = 1.0  # mm across a whole volume; scanners have more
+_WIDEST_MM = 12.0  # mm; a note is written if the finest spacing is wider. PET has up to 10
+_LEAST_MM = 1.0  # mm; a note is written if the longest edge of a volume is shorter
 
 _LONGEST_PIXEL = 30.0  # length of a pixel over its width; OCT and line scans reach about 10
 _THICKEST_SLICE = 300.0  # distance between slices over the length of a pixel; sections reach 100
-_THINNEST_SLICE = 1 / 30.0  # the same ratio; oversampled light-sheet stacks reach 1/4
+_THINNEST_SLICE = 1 / 30.0  # least such ratio; oversampled light-sheet stacks reach 1/4
 _QUESTION = "is the unit of one of them wrong? (--spacing-um z,y,x replaces it)"
 
 

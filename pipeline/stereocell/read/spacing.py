@@ -15,8 +15,8 @@ PartialTriple = tuple[float | None, float | None, float | None]
 _UM: dict[str, float] = {
     "angstrom": 1e-4,
     "\u00c5": 1e-4,
-    "\u00e5": 1e-4,  # the same letter in lower case
-    "\u212b": 1e-4,  # the sign of the unit, a character of its own
+    "\u00e5": 1e-4,  # lower case of the letter above
+    "\u212b": 1e-4,  # the angstrom sign, which is not the letter
     "\u00e5ngstrom": 1e-4,
     "\u00e5ngstr\u00f6m": 1e-4,
     "A": 1e-4,

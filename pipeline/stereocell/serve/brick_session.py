@@ -68,7 +68,7 @@ class BrickEndpoint:
     def __init__(self) -> None:
         self._builder = ThreadPoolExecutor(1, "bricks-build")
         self._quick = ThreadPoolExecutor(2, "bricks-read")
-        self._connections: Counter[str] = Counter()  # by the client's address
+        self._connections: Counter[str] = Counter()  # number of connections by client's address
 
     async def talk(self, socket: WebSocket, library: BrickLibrary) -> None:
         """Talk to one client of a library until it leaves or is closed."""

@@ -28,7 +28,7 @@ from stereocell.storage.file_list import find_faults, read_list
 VALUES_HEADER = {"Stereocell-Values": "version=1"}  # announces /values to a page
 _LIST = "files.json"  # the stage's list of files
 _OPEN_FILES = 32  # most files that stay open
-_LONGEST = 200  # most characters of `at` that are read
+_LONGEST = 200  # characters of `at` that are read at most
 _HEADERS = {"Cache-Control": "no-store", **policy("application/json")}
 
 

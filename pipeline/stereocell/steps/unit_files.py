@@ -286,7 +286,7 @@ def _arrays(lod: Lod) -> dict[str, Any]:
 
 
 def _share(stored: NDArray[np.uint8] | None) -> NDArray[np.float32] | None:
-    """Return 0..255 as 0..1; None for None."""
+    """Return stored values 0..255 as float32 0..1, or None if there are none."""
     return None if stored is None else np.divide(stored, 255, dtype=np.float32)
 
 

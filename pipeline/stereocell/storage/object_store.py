@@ -63,7 +63,7 @@ class Mirror:
         self.sizes: dict[str, int] | None = None
         self.news: dict[str, Size] = {}
         self.making: set[Path] = set()  # folders that this process will upload completely
-        self.moves: dict[str, str] = {}  # for keys in these folders, the key of the object to move
+        self.moves: dict[str, str] = {}  # new key in a folder of `making` -> key of object to move
         self._folders: dict[str, set[str]] = {}
         self._require_alone: Callable[[], None] = self._require_claim
 

@@ -23,7 +23,7 @@ FORMS = (
     "https://api.dandiarchive.org/api/assets/UUID/",
     "https://dandiarchive.org/dandiset/NUMBER/VERSION/files?location=PATH",
 )
-FILE_BYTES = 16 << 30  # bytes of the largest NIfTI file
+FILE_BYTES = 16 << 30  # bytes; a larger NIfTI file is refused
 _UUID = r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}"
 _OBJECT = re.compile(r"/(zarr|blobs)(/[\w-]+)+/?")
 _NUMBER, _VERSION = r"\d{6}", r"draft|\d+\.\d+\.\d+"
@@ -39,7 +39,7 @@ _HOSTS = (
 )
 _NIFTI = (".nii", ".nii.gz")
 _READ = (".zarr", *_NIFTI)
-_LISTED = 5  # assets that a message names
+_LISTED = 5  # assets that a message names at most
 
 
 def resolve(address: str) -> Resolved | None:

@@ -22,7 +22,7 @@ _LOCK = ".lock"
 
 
 def new_folder(name: str) -> Path:
-    """Return a new, empty folder with this name, which is removed when this process ends."""
+    """Create an empty folder with this name and return it. It is removed when this process ends."""
     _remove_abandoned()
     outer = Path(tempfile.mkdtemp(prefix=_PREFIX))
     atexit.register(_remove, outer, os.getpid())

@@ -64,7 +64,7 @@ class _Held:
         self.bytes = bytearray()
 
     def starts_with(self, mark: bytes) -> bool:
-        """Return whether the next bytes are these."""
+        """Return whether the next bytes are those of `mark`. They stay in the buffer."""
         while len(self.bytes) < len(mark):
             self._fill()
         return self.bytes.startswith(mark)

@@ -23,7 +23,7 @@ _CHANNEL = "channel"
 _OTHER_SCALE = 0.05  # relative difference in scale; chromatic aberration stays below 0.01
 # cosine of the largest angle between the same axis of two channels
 _OTHER_DIRECTION = math.cos(math.radians(45))
-_SHOWN = 8  # numbers that a message shows
+_SHOWN = 8  # missing time points or setups that a message lists at most
 
 Matrix = NDArray[np.float64]  # (4, 4), for column vectors: from voxels (x, y, z, 1) to the world
 

@@ -43,7 +43,7 @@ class _Cells:
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
         found = np.asarray(self._array[key])
-        return found.astype(self.dtype, copy=False)  # conversion from int16 is modulo 2^16
+        return found.astype(self.dtype, copy=False)  # int16 -1 becomes uint16 65535
 
 
 def is_container(tree: Hdf5Tree) -> bool:

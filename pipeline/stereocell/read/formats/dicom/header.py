@@ -96,7 +96,7 @@ SEGMENTATION = "holding a segmentation"  # first words of the reason for leaving
 _NO_PLACE = "without a place in the patient"
 _NO_SPACING = "without a PixelSpacing above 0"
 _UNDEFINED = 0xFFFFFFFF  # length of an element that ends with a delimiter
-_LONG_VRS = (b"OB", b"OW", b"OF", b"OD", b"UN")  # their length has four bytes
+_LONG_VRS = (b"OB", b"OW", b"OF", b"OD", b"UN")  # VRs whose elements state a length of four bytes
 # attributes that pydicom needs to decode pixels
 _ASKED = (
     "Rows",

@@ -48,7 +48,7 @@ from stereocell.read.whole_array import WholeArray
 from stereocell.storage.location import Location, first_bytes, is_own
 
 _INSTEAD = "expected the image that it was drawn on"
-_MOST_KINDS = 4  # kinds of images that notes name
+_MOST_KINDS = 4  # kinds of images that a note names at most
 _COPIES = "copies of others"
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 

@@ -40,7 +40,7 @@ from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
 _MAX_TIMES = 100_000
-_LISTED = 12  # datasets that a message names
+_LISTED = 12  # datasets that a message names at most
 _TYPES = {f"{kind}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)}
 _TYPES |= {"float32", "float64"}
 

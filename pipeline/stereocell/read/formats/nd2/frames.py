@@ -24,7 +24,7 @@ _END_MARK, _MAP_MARK = b"ND2 CHUNK MAP SIGNATURE 0000001!", b"ND2 FILEMAP SIGNAT
 _FRAME = b"ImageDataSeq|"
 _TIME = 8  # bytes of the time stamp before the voxels of a frame
 _VOXELS_AT = 4096  # bytes from a frame's header to its voxels, the value that nd2 uses
-_MAX_MAP = 1 << 30  # bytes of the map
+_MAX_MAP = 1 << 30  # bytes; a larger map is refused
 
 
 class Nd2Frames:
@@ -47,7 +47,7 @@ class Nd2Frames:
         return [] if self._places is None else [n for n in numbers if n not in self._places]
 
     def require(self, number: int) -> None:
-        """Raise SourceError where a frame is not in the file, or not where the map says."""
+        """Raise SourceError where a frame is missing, or is not where the map of chunks says."""
         if self._places is None or number in self._sound:
             return
         if number not in self._places:

@@ -138,7 +138,7 @@ def require_whole(image: Any, where: str) -> tuple[str, ...]:
             unpack(file, 0, "gzip", most_behind=_MAX_OFFSET)
     if _is_packed(name):
         return ()
-    shape = tuple(map(int, data.shape))  # NumPy's integers would overflow
+    shape = tuple(map(int, data.shape))  # products of NumPy's integers would overflow
     end, size = data.offset + math.prod(shape) * data.dtype.itemsize, os.path.getsize(name)
     if end > size:
         raise SourceError(

@@ -15,7 +15,7 @@ from tifffile import TiffPage
 
 from stereocell.read.value_scale import ValueScale
 
-_METADATA, _NODATA = 42112, 42113  # tags
+_METADATA, _NODATA = 42112, 42113  # TIFF tags GDAL_METADATA and GDAL_NODATA
 _MAX_CHARACTERS = 1 << 20
 
 
