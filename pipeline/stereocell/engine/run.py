@@ -137,7 +137,7 @@ class Engine:
             for place, task in enumerate(tasks):
                 try:
                     result = function(task)
-                except Exception as error:  # as on a worker, a failed task doesn't stop the others
+                except Exception as error:  # a failed task doesn't stop the others, as on workers
                     yield place, None, error
                 else:
                     yield place, result, None

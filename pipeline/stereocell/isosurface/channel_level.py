@@ -283,7 +283,7 @@ def _first(levels: Sequence[Level]) -> Level | None:
 
 
 def _is_outside(darkest: float | None, histogram: LevelHistogram, levels: Sequence[Level]) -> bool:
-    """Whether padding is dark ground: the histogram has no gap between padding and the rest."""
+    """Whether padding is dark ground: no gap lies between its value and those of other voxels."""
     if darkest is None or not levels:
         return True
     return histogram.quantile(0.001) - darkest <= PADDING_SHARE * (levels[0].outside - darkest)

@@ -136,7 +136,7 @@ def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> lis
             found.append(replace(channel, level=surfaces[0]))
             continue
         for place, surface in enumerate(surfaces):
-            # each further surface is lighter; if the channel's colour is pale, darker
+            # each further surface is lighter than the one before, or darker in a pale channel
             share, end = place / len(surfaces), float(min(channel.color) < _PALE)
             red, green, blue = (part + share * (end - part) for part in channel.color)
             found.append(

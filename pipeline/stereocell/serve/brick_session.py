@@ -87,7 +87,7 @@ class BrickEndpoint:
             counts += Counter()  # this addition removes entries of 0
 
     def close(self) -> None:
-        """End the threads after the work that they are doing now; drop the rest."""
+        """End the threads after the work that they are doing now; drop work that waits."""
         self._builder.shutdown(wait=False, cancel_futures=True)
         self._quick.shutdown(wait=False, cancel_futures=True)
 

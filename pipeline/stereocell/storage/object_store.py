@@ -16,7 +16,7 @@ from stereocell.storage.object_lock import alone_at
 Size = int | None  # bytes of an object; None: it was removed
 
 _SMALL_BYTES = 1 << 16  # bytes of the largest object that counts as small
-# Files that list or describe other files. They are uploaded after those, in this order.
+# Files that list or describe other files. They are uploaded after all others, in this order.
 _LAST = (
     "tile.usdc",
     "contents.usda",

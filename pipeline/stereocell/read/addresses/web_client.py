@@ -22,7 +22,7 @@ from stereocell.storage.public_hosts import (
 )
 
 ANSWER_BYTES = 16 << 20  # bytes of the largest answer in JSON or XML
-ANSWER_S = 60.0  # s for such an answer, from its first byte to its last
+ANSWER_S = 60.0  # s for an answer in JSON or XML, from its first byte to its last
 _REDIRECTS = 5
 _BLOCK_BYTES = 1 << 18
 _MOVED = (301, 302, 303, 307, 308)

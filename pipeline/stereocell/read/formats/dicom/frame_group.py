@@ -36,13 +36,13 @@ class Group:
 
     def __init__(self, first: Frame) -> None:
         self.frames = [first]
-        self.words: tuple[str, ...] = ()  # properties that separate it from other groups, in words
-        self.order: tuple[int, ...] = ()  # key that sorts it among those groups
+        self.words: tuple[str, ...] = ()  # words for its difference from other groups of the series
+        self.order: tuple[int, ...] = ()  # key that sorts it among the groups of the series
         self.notes: tuple[str, ...] = ()
         self.unjoined = ""  # why slices with different UIDs were not joined to one stack
         self._directions = _directions(first)
         self._spacing = np.array(first.spacing)
-        # all frames state the same values, so no mean, which rounds, is needed
+        # True while all frames state the same values, so that no mean, which rounds, is needed
         self._is_exact = True
 
     def takes(self, frame: Frame) -> bool:

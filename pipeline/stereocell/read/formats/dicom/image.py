@@ -246,7 +246,7 @@ def _find(location: Location) -> Found:
             remedies.append(error.remedy)
     compare = partial(_are_equal, paths, location.shown)
     twice = set()
-    # the same image stored twice; with other pixels it is another image
+    # Two files with one image UID: equal pixels are left out as copies, others are separate images.
     for earlier, frame in copies:
         if earlier.position == frame.position and compare(earlier, frame):
             twice.add(frame.file)

@@ -62,7 +62,7 @@ def open_image(location: Location) -> Any:
                 )
             if not isinstance(image, nibabel.nifti1.Nifti1Pair | nibabel.analyze.AnalyzeImage):
                 raise TypeError
-            # An invalid quaternion, unit or type fails here rather than later.
+            # These reads raise an error for an invalid quaternion, unit or type.
             header: Any = image.header
             image.affine.sum()
             if isinstance(image, nibabel.nifti1.Nifti1Pair):

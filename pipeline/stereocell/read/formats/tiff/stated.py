@@ -261,7 +261,7 @@ def _shaped(tiff: TiffFile, page: TiffPage) -> Stated:
     return Stated((z, y, x))
 
 
-# by tifffile's flags; the first one that is set counts
+# tifffile's flag for a kind of file -> reader of its metadata; the first flag that is set counts
 _READERS: dict[str, Callable[[TiffFile, TiffPage], Stated]] = {
     "is_lsm": _lsm,
     "is_stk": _stk,
