@@ -94,7 +94,7 @@ class ChannelLevels:
     subtracts    whether the values are above the background
     has_padding  whether padding was found and left out
     noise        sigma of the denoised field, voxel values
-    finest_um    the finest voxel spacing
+    finest_um    the smallest of the voxel spacings along z, y and x, um
     sums         sums over the voxels of the field, or of the field above the background
     histogram    histogram of the same values
     light        share of the variance, 0..1, that lies along the axes alone; see axis_profiles.py
@@ -218,7 +218,7 @@ def find_levels(
 
     tiles      all tiles of the dataset
     counting   scales by which the tiles were counted
-    finest_um  the finest voxel spacing
+    finest_um  the smallest of the voxel spacings along z, y and x, um
     modality   DICOM's code; no background is subtracted from CT and MR
     options    criterion of edges that chooses the only level; None: levels follow from histograms
     subtracts  whether the levels are above the background; None: only if subtraction gains
