@@ -246,7 +246,7 @@ def _find(location: Location) -> Found:
             remedies.append(error.remedy)
     compare = partial(_are_equal, paths, location.shown)
     twice = set()
-    # Two files with one image UID: equal pixels are left out as copies, others are separate images.
+    # Images with one UID are copies if their positions and pixels are equal, else separate images.
     for earlier, frame in copies:
         if earlier.position == frame.position and compare(earlier, frame):
             twice.add(frame.file)
