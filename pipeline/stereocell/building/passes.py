@@ -29,7 +29,7 @@ from stereocell.steps.labels import Labels
 from stereocell.steps.sum_components import SumComponents, Sums
 
 R = TypeVar("R")
-ByChannel = dict[str, Results[R]]  # by channel ID, each by tile ID
+ByChannel = dict[str, Results[R]]  # results by channel ID, then by tile ID
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,7 +61,7 @@ class Phase:
             console.print(f"{self.name}: {line}", markup=False, soft_wrap=True)
 
     def save(self, seconds: float, *, is_finished: bool = True) -> None:
-        """Save the phase's record."""
+        """Write the phase's record to phases.json. A phase that isn't finished has no key there."""
         entry = {"key": "", "results": "", "about": "", "seconds": round(seconds, 2)}
         if is_finished:
             entry |= {"key": self.key, "results": self.results(), "about": self.about}

@@ -84,7 +84,7 @@ def make_plan(
     out_folder.require_name()
     with phase_of(out_folder, "plan") as phase:
         if engine is not None:
-            require_own_places(out_folder, is_same_plan=True)  # fails early, whatever the plan is
+            require_own_places(out_folder, is_same_plan=True)  # fails before the input is read
         plan = settle(source, settings, choice, title=title)
         plan = replace(plan, notes=(*plan.notes, *notes_on_levels(plan)))
         text = to_readable_toml(plan.settings)

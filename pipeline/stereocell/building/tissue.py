@@ -175,7 +175,7 @@ def _learn(out_folder: OutFolder, plan: Plan, step: LearnTissue) -> None:
     planned = _with_classes(plan, _source_in(out_folder.out), "0" * 64, found.record)
     out_folder.require_readable(planned)
     step.FORM.write(out_folder.out / FOLDER, found)
-    open_source.cache_clear()  # the address holds another volume now
+    open_source.cache_clear()  # OUT/tissue, which may be open as a source, holds another volume now
 
 
 def _find_channel(plan: Plan, wanted: str) -> Channel:

@@ -18,9 +18,9 @@ from stereocell.engine.interrupts import Terminated, answering_sigterm
 from stereocell.model.errors import StereoCellError, UsageError
 from stereocell.storage.processes import require_address_space, shortage
 
-_GARBAGE_AFTER = (
-    20_000  # new objects between collections; at Python's 700, they take a tenth of the time
-)
+# New objects between two garbage collections. With Python's default of 700, collections take a
+# tenth of a command's time.
+_GARBAGE_AFTER = 20_000
 EXIT_CODES = """exit codes:
   0    success
   1    an error, reported in one line; `check`: a check failed; `doctor`: a required part is missing
@@ -140,7 +140,7 @@ def _run(options: argparse.Namespace) -> int:
             from stereocell.storage.overwriting import AT_A_PROMPT, forcing
 
             stack.enter_context(forcing(options.force, AT_A_PROMPT))
-        if isinstance(out, str):  # an address
+        if isinstance(out, str):  # OUT is an address, not a local path
             if name not in WRITERS | READERS.keys():
                 from stereocell.storage.location import Location
 

@@ -26,7 +26,7 @@ def build_behind(
     success. It runs in a process of its own, so it and all its values can be pickled.
     """
     build = {"command": "build", "handler": handler, "input": str(options.out), "force": False}
-    found = resolve(str(options.out))  # fetched data is not fetched again
+    found = resolve(str(options.out))  # passed on, so that data is not fetched again
     return partial(_build, {**vars(options), **build}, found)
 
 

@@ -280,7 +280,7 @@ def slices(options: argparse.Namespace) -> Answer:
 
 
 def sample(options: argparse.Namespace) -> Answer:
-    """Write a sample."""
+    """Write the files of a sample specimen, to try the other commands on."""
     from stereocell import samples
 
     if options.name == "cycif":

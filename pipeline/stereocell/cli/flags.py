@@ -421,7 +421,7 @@ def declare_sample(parser: argparse.ArgumentParser) -> None:
 
 
 def declare_view(parser: argparse.ArgumentParser) -> None:
-    """Declare the flags of `view`: those of `serve`, and the browser."""
+    """Declare the flags of `view`: those of `serve`, and --no-browser."""
     declare_serve(parser)
     parser.add_argument("--no-browser", action="store_true", help="don't open a browser")
 

@@ -77,7 +77,7 @@ def is_open_to_all(client: Any) -> bool:
 def _reason(error: Exception) -> str:
     """Return why a scheduler can't be joined, and what to do."""
     text = str(error).splitlines()[0] if str(error) else "the scheduler does not answer"
-    if isinstance(error, TypeError) and "ssl_context" in text:  # Dask's message
+    if isinstance(error, TypeError) and "ssl_context" in text:  # Dask's error without a certificate
         return (
             "the scheduler admits only clients with a certificate, and this command has none, "
             f"{_TLS_HELP}"

@@ -74,7 +74,7 @@ class Engine:
         self.watch: Watch = watch or (lambda *_: None)
         self._scheduler = scheduler
         self._shared = shared
-        self._client: Any = None  # of the cluster
+        self._client: Any = None  # client of the cluster; None: no cluster has been joined
         self._pool: WorkerPool | None = None
 
     def join(self) -> None:
@@ -117,7 +117,8 @@ class Engine:
                     advance(tasks[place][0], error is not None)
                     self.watch(label, len(results) + len(failures), len(tasks), tasks[place][0])
         except KeyboardInterrupt:
-            self.close()  # at once, or workers would write into folders that are being removed
+            # Workers end at once. Otherwise they would write into folders that are being removed.
+            self.close()
             raise
         if failures:
             named: dict[str, list[str]] = {}  # tasks that failed for the same reason share a line
@@ -136,7 +137,7 @@ class Engine:
             for place, task in enumerate(tasks):
                 try:
                     result = function(task)
-                except Exception as error:  # as on a worker, a failed task doesn't stop the others
+                except Exception as error:  # a failed task doesn't stop the others, as on workers
                     yield place, None, error
                 else:
                     yield place, result, None

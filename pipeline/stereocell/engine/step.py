@@ -26,7 +26,7 @@ class Form(Protocol[R_contra]):
     """The form in which a step's result lies in OUT."""
 
     def is_whole(self, place: Path) -> bool:
-        """Return whether an undamaged result lies there."""
+        """Return whether an undamaged result lies at a place."""
 
     def write(self, place: Path, result: R_contra) -> None:
         """Write a result completely or not at all. Raises OutputError."""
@@ -80,7 +80,7 @@ class Step(Keyed, Work, Generic[R]):
 
     @abstractmethod
     def run(self) -> R:
-        """Compute the result."""
+        """Compute the result and return it."""
 
     def is_whole(self, place: Path) -> bool:
         """Return whether an undamaged result lies at a place."""

@@ -194,7 +194,8 @@ def leave_if_importing_main() -> None:
     A worker imports the script that started it. A script without the line
     `if __name__ == "__main__":` then starts its build again, and the command reports that.
     """
-    if getattr(multiprocessing.current_process(), "_inheriting", False):  # multiprocessing's test
+    # multiprocessing itself tests this attribute while a worker imports the command's script
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
         os._exit(1)  # an exception would print a traceback
 
 

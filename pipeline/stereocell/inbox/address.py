@@ -1,4 +1,4 @@
-"""Check addresses that people paste: only http(s) and s3, and only public hosts for others.
+"""Check addresses that people paste: http(s) or s3, and from other machines only public hosts.
 
 A person at this machine may name any http(s) or s3 address that `build` takes. A person at another
 machine acts through this one, which may reach more than they do: hosts of its own network, and data
@@ -26,7 +26,7 @@ _EXPECTED = "expected an image's address with https://, http:// or s3://"
 def check_address(address: str, *, is_local: bool) -> str:
     """Return an address that may be read. Raises RefusedError.
 
-    is_local  the person is at this machine
+    is_local  whether the person is at this machine and may name hosts of its private network
     """
     text = address.strip()
     if not text.isprintable() or not text.isascii() or " " in text or "\\" in text:

@@ -92,7 +92,7 @@ def _files_of_dicom(files: Sequence[Unpacked]) -> list[Unpacked]:
         if found.format == _DICOM:
             marked.append(one)
         elif one.parts[-1].lower().endswith(_DICOM_ENDINGS) and not found.is_known:
-            loose.append(one)  # old DICOM files lack the mark
+            loose.append(one)  # DICOM files from before 1993 lack the mark
     return [*marked, *loose] if marked or len(loose) == len(files) else []
 
 

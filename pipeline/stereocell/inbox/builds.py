@@ -83,7 +83,8 @@ class Builds:
     def _update(self, item: Item, build: BuildProcess) -> None:
         inbox, state = self._inbox, build.state
         is_current = inbox.is_here(item) and item.build is build
-        if not is_current or item.doing not in ("building", "paused"):  # cancelled, or queued again
+        # The item was cancelled, deleted or queued again.
+        if not is_current or item.doing not in ("building", "paused"):
             self._end(build)
         elif state.doing == "complete":
             self._end(build)

@@ -113,9 +113,10 @@ class Inbox:
     # --- uploads
 
     def announce(self, content: Any, *, is_local: bool) -> tuple[Item, bool]:
-        """Return the item of an announced upload, and whether the item is new. Raises RefusedError.
+        """Register an announced upload; return its item, and whether the item is new.
 
-        If an upload of the same list was interrupted, it continues: the item is not new.
+        If an upload of the same list was interrupted, it continues: the item is not new. Raises
+        RefusedError.
         """
         announced = parse_announced(content, self.limits)
         if announced.address:

@@ -53,8 +53,9 @@ class Item:
     is_local      whether a person at this machine uploaded it
     round         number of changes of the choices; results of a smaller number are outdated
     viewed_round  the round of the first view; -1 if there is no view
-    newest        folder of the newest view, such as `g1/`, without views of the build; or empty
-    writer        the piece that may write; a later piece takes over
+    newest        folder of the newest view, such as `g1/`, without those that the present build
+                  writes; or empty
+    writer        the piece of the upload that may write; a later piece takes over
     writing       lock that is held while bytes are written
     reading       lock that is held while the upload is read and the results are written
     is_deleted    whether the folder is being deleted, so that no reading may begin

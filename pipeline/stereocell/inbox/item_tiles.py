@@ -1,4 +1,4 @@
-"""Full-resolution tiles of an item for close views, read from the upload as a build reads them."""
+"""Full-resolution tiles of an item for a camera nearby, read from the upload as a build does."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING

@@ -14,7 +14,7 @@ from stereocell.storage.child_process import ChildError
 from stereocell.storage.location import Location
 from stereocell.storage.processes import shortage
 
-_LONGEST = 600  # characters, longest line
+_LONGEST = 600  # characters; the end of a longer line is cut
 # Common names of files that are also words of messages, and nobody's name; see `_own_words`.
 _WORDS = "image volume scan specimen file folder source data level series channel tile head brain"
 _LETTERS = re.compile(r"[^\W\d_]+")

@@ -42,7 +42,7 @@ def write_middle_slices(
 ) -> list[dict[str, str]]:
     """Write a picture for each axis; return the axes, names and files of the pictures.
 
-    spacing_um  voxel spacing of the resolution level that is built
+    spacing_um  voxel spacing (z, y, x) of the resolution level that is built, um
     """
     folder.mkdir(parents=True, exist_ok=True)
     written = []

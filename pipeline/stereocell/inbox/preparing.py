@@ -114,7 +114,7 @@ def write_first_view(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBu
 
 
 def _live_of(page: Path, bundle: Path, tiles: ItemTiles, build: ItemBuild) -> Live:
-    """Return a view whose files are already written."""
+    """Return a first view whose files are already written, in the form that LiveApp serves."""
     first: Future[None] = Future()
     first.set_result(None)
     return Live(page, bundle, first, tiles, build, Reading(lambda _: None))
@@ -134,7 +134,7 @@ def view_item(inbox: Inbox, item: Item, page: Path) -> str:
     if item.upload is None:
         raise RefusedError(409, "the upload was deleted: upload the files again")
     with item.reading:
-        if item.page:  # another request was first
+        if item.page:  # another request has written the view meanwhile
             return item.page
         if item.is_deleted:
             raise RefusedError(410, "the item was deleted")

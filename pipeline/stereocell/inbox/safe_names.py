@@ -1,4 +1,4 @@
-"""Neutral names for the files of one specimen, in place of those that people gave them.
+"""Neutral names for the files of one specimen, in place of the names that people gave them.
 
 The name of a file may contain the name of a person. The new name keeps only the parts that readers
 need: the ending, the numbers of planes and channels, and the keys of a Zarr group.
@@ -54,7 +54,7 @@ def group_names(names: Sequence[Parts]) -> list[Parts] | None:
 
 
 def _below_group(names: Sequence[Parts], own: Sequence[str]) -> list[Parts]:
-    """Return names without the folders around the group, but with those inside it."""
+    """Return the files' names relative to the folder of the Zarr or N5 group."""
     tops = [parts[:-1] for parts in names if parts[-1] in own]
     depth = min(map(len, tops))
     if len({top[:depth] for top in tops}) == 1 and all(

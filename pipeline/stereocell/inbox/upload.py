@@ -57,7 +57,7 @@ class Announced:
 
     @property
     def parts(self) -> list[Parts]:
-        """Each name as its folders and file."""
+        """The names of the files, each split into its folders and the file's own name."""
         return [tuple(name.split("/")) for name in self.names]
 
 

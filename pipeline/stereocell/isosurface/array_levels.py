@@ -1,4 +1,4 @@
-"""Find the levels of a volume that fits into memory, for a notebook or a script."""
+"""Find the iso-levels of a volume that fits into memory, for a notebook or a script."""
 
 from dataclasses import dataclass
 

@@ -1,12 +1,12 @@
 """Detect channels that show uneven light and no bodies: their values vary along the axes alone.
 
-Light that falls off with depth, a ramp, stripes and vignetting are nearly sums of a function of z,
-one of y and one of x. Bodies are not. In the volumes of `make bench-iso` the means along the axes
-explain at most .45 of the variance. In empty fields and pure texture under such light they explain
-.86 to 1.0.
+The axes are those of `slices_first`: slice, row and column. Light that falls off with depth, a
+ramp, stripes and vignetting are nearly sums of a function of the slice, one of the row and one of
+the column. Bodies are not. In the volumes of `make bench-iso` the means along the axes explain at
+most .45 of the variance. In empty fields and pure texture under such light they explain .86 to 1.0.
 
-A slab of tissue between two dark ends varies along z alone as well, but its values rise and fall
-again. An edge of tissue across an axis also varies along one axis only, but its level lies in a
+A slab of tissue between two dark ends varies from slice to slice alone as well, but its values rise
+and fall again. A straight edge of tissue also varies along one axis only, but its level lies in a
 valley between two peaks of the histogram. The valley was .6 and deeper in 20 such volumes, and
 light makes none. Fields of different brightness side by side look like such an edge and cannot be
 distinguished from it.
@@ -20,19 +20,20 @@ from numpy.typing import NDArray
 
 # Share of the variance along the axes; a channel with more shows light, not bodies
 MAX_LIGHT = 0.85
-# Sum of all rises and falls along z over the range; up to this, values only rise or only fall
+# Sum of all rises and falls from slice to slice over the range; up to this, values count as only
+# rising or only falling
 _ONE_WAY = 1.25
-# Planes averaged before rises and falls are summed, since noise rises and falls everywhere
+# Slices averaged before rises and falls are summed, since noise rises and falls everywhere
 _BLUR = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Profiles:
-    """Sums over a tile's voxels in each plane across an axis. Padding is left out.
+    """Sums over a tile's voxels in each plane perpendicular to an axis. Padding is left out.
 
-    start   voxels (z, y, x) at which the tile begins
-    sums    float64, sums of the values by z, by y and by x
-    counts  int64, numbers of voxels by z, by y and by x
+    start   index (slice, row, column) of the tile's first voxel
+    sums    float64, sums of the values by slice, by row and by column
+    counts  int64, numbers of voxels by slice, by row and by column
     """
 
     start: tuple[int, int, int]
@@ -43,7 +44,11 @@ class Profiles:
     def of(
         cls, field: NDArray[np.float32], kept: NDArray[np.bool_], start: tuple[int, int, int]
     ) -> "Profiles":
-        """Return a tile's profiles over the voxels of `field` (z, y, x) that are `kept` (bool)."""
+        """Return a tile's profiles over those voxels of `field` that are `kept` (bool).
+
+        field  (slice, row, column); `kept` has the same shape
+        start  index (slice, row, column) of the tile's first voxel in the dataset
+        """
         are_all = bool(kept.all())
         values = np.ascontiguousarray(field) if are_all else np.where(kept, field, np.float32(0))
         sz, sy, sx = (values.sum(axis=axes, dtype=np.float64) for axes in _ACROSS)
@@ -64,7 +69,7 @@ def share_of_light(
 
     tiles     all tiles of the dataset; profiles of the field in which levels are looked for
     plain     all tiles; profiles of the field before subtraction, because a subtracted background
-              rises and falls along z
+              rises and falls from slice to slice
     variance  of the values in which levels are looked for, without noise
     """
     if not tiles or not variance > 0:
@@ -79,7 +84,10 @@ def share_of_light(
 
 
 def _means(tiles: Sequence[Profiles], axis: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the mean and the number of voxels of each plane across an axis that has voxels."""
+    """Return the mean and the number of voxels of each plane at right angles to an axis.
+
+    Planes without counted voxels are left out.
+    """
     length = max(tile.start[axis] + len(tile.sums[axis]) for tile in tiles)
     sums, counts = np.zeros(length), np.zeros(length)
     for tile in tiles:

@@ -1,4 +1,4 @@
-"""Find the levels of a channel's surfaces: one set of levels for all tiles of the dataset.
+"""Find the iso-levels of a channel's surfaces: one set of levels for all tiles of the dataset.
 
 The levels are ordered from the outermost to the innermost: air and skin, then skin and bone;
 ground and tissue, then tissue and cells. They are found on histograms that are summed over the
@@ -94,11 +94,11 @@ class ChannelLevels:
     subtracts    whether the values are above the background
     has_padding  whether padding was found and left out
     noise        sigma of the denoised field, voxel values
-    finest_um    the finest voxel spacing
-    sums         of the field, or of the field above the background
-    histogram    of the field, or of the field above the background
+    finest_um    the smallest of the voxel spacings along z, y and x, um
+    sums         sums over the voxels of the field, or of the field above the background
+    histogram    histogram of the same values
     light        share of the variance, 0..1, that lies along the axes alone; see axis_profiles.py
-    correlation  of neighbouring voxels as read; see neighbours.py
+    correlation  correlation of neighbouring voxels as read; see neighbours.py
     """
 
     all_levels: tuple[Level, ...]
@@ -154,7 +154,7 @@ class ChannelLevels:
     def judge(self, value: float) -> Level:
         """Return a level that was found by other means, with its measures.
 
-        value  of the level, in voxel values
+        value  voxel value of the level
         """
         valleys = self._field.histogram.find_valleys(self.noise)
         dips = [valley.dip for valley in valleys if valley.low <= value <= valley.high]
@@ -218,7 +218,7 @@ def find_levels(
 
     tiles      all tiles of the dataset
     counting   scales by which the tiles were counted
-    finest_um  the finest voxel spacing
+    finest_um  the smallest of the voxel spacings along z, y and x, um
     modality   DICOM's code; no background is subtracted from CT and MR
     options    criterion of edges that chooses the only level; None: levels follow from histograms
     subtracts  whether the levels are above the background; None: only if subtraction gains
@@ -283,7 +283,7 @@ def _first(levels: Sequence[Level]) -> Level | None:
 
 
 def _is_outside(darkest: float | None, histogram: LevelHistogram, levels: Sequence[Level]) -> bool:
-    """Whether padding is dark ground: the histogram has no gap between padding and the rest."""
+    """Whether padding is dark ground: no gap lies between its value and those of other voxels."""
     if darkest is None or not levels:
         return True
     return histogram.quantile(0.001) - darkest <= PADDING_SHARE * (levels[0].outside - darkest)

@@ -32,7 +32,7 @@ class Components:
     voxels: NDArray[np.int64]
     _faces: NDArray[np.int64]
     _shape: tuple[int, int, int]
-    _runs: tuple[NDArray[np.int64], _Ints, _Ints, _Ints]  # each run's row, start, stop, component
+    _runs: tuple[NDArray[np.int64], _Ints, _Ints, _Ints]  # row, start, stop, component of each run
 
     def faces(self) -> NDArray[np.int64]:
         """Return how many triangles an iso-surface around each component has, int64 (n,).

@@ -3,8 +3,8 @@
 The stated distances of a surface are measured on the filtered field, so they do not show what the
 filter removed. Therefore the solid is also compared with the voxels as they were read.
 
-All voxels are compared, even if only some planes of voxels carry the surface. The solid is linear
-between these planes, and constant beyond the last one.
+All voxels are compared, even if the surface was extracted from only some planes of voxels. The
+solid is linear between these planes, and constant beyond the last one.
 """
 
 from typing import Any
@@ -32,7 +32,7 @@ def measure_cover(
 
     voxels      (z, y, x) as read, the lattice's window
     distance    float32 of the repaired solid, positive inside, the thinned lattice's window
-    step        voxels (z, y, x) between planes that carry the surface
+    step        voxels (z, y, x) between the planes from which the surface was extracted
     iso         level above the background, voxel values
     background  voxel values; None: none was subtracted
     holder      pieces that are left out of the surface, and so of the count; None: nothing is

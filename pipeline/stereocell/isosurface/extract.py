@@ -62,7 +62,7 @@ def extract_surface(
         (int(lattice.cap is not None and a == low), int(lattice.cap is not None and b == high))
         for a, b, low, high in zip(own.start, own.stop, region.start, region.stop, strict=True)
     ]
-    # Where the lattice ends with the region, the window ends too, and both get the same margin.
+    # Where the tile ends with the region, the window ends there, too, and gets the cap's margin.
     margin = np.array([low for low, _ in cap])
     distance = np.pad(distance, cap, constant_values=-limit)
     box = [

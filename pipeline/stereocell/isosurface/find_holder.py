@@ -207,7 +207,10 @@ def _near_cores(
 
 
 def _cells_of(mask: NDArray[np.bool_], kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the mask in fewer cells. A cell that holds a part of what stays is not in the mask."""
+    """Return the mask in at most _CELLS cells of one or more voxels.
+
+    A cell is True if it holds voxels of the mask and none of `kept`.
+    """
     factor = 1
     while np.prod([-(-n // factor) for n in mask.shape]) > _CELLS:
         factor += 1

@@ -60,9 +60,10 @@ class TileEvidence:
     padding      sums of the denoised field over the padding
     above        sums of the field above the background; None: the channel has no background
     differences  int64 (NOISE_BINS,), counts of differences between voxels LAG apart along a row
-    profiles     along the axes, of the field and of the field above the background
+    profiles     sums along the axes, of the field and of the field above the background
     neighbours   sums over neighbouring voxels as read
-    edges        of the field and of the field above the background, if a criterion scores edges
+    edges        sums for scoring edges, of the field and of the field above the background; None:
+                 no criterion scores edges
     """
 
     plain: Sums
@@ -139,7 +140,7 @@ def find_padding(
 
 
 def _has_run(flags: NDArray[np.bool_], length: int) -> bool:
-    """Return whether `length` flags are set side by side along x."""
+    """Return whether `length` flags are set side by side along a row (the last axis)."""
     known = 1
     while known < length and flags.any():
         onward = min(known, length - known)
@@ -170,7 +171,7 @@ def gather_evidence(
     voxels       as read, the same window
     spacing_um   of the three axes
     counting     scales of the channel
-    start        voxels of the dataset at which the tile begins
+    start        index (slice, row, column) of the tile's first voxel in the dataset
     background   float32, broadcasts over the window, voxel values; None: no background is tried
     criterion    the criterion that scores edges; None: levels follow from histograms
 

@@ -23,7 +23,8 @@ class Neighbours:
     """Sums over a tile's voxels, as values less the scale's middle. Padding is left out.
 
     voxels  count, sum and sum of squares, float64 (3,)
-    pairs   neighbours along y and along x: count and sum of products, float64 (2, 2)
+    pairs   neighbours within a slice, from row to row and from column to column: count and sum of
+            products, float64 (2, 2)
     """
 
     voxels: NDArray[np.float64]
@@ -39,7 +40,7 @@ class Neighbours:
     ) -> "Neighbours":
         """Return the sums of a tile.
 
-        voxels   (z, y, x), as read, of a window around the tile
+        voxels   (slice, row, column), as read, of a window around the tile
         padding  bool, the same window
         own      the tile within the window
         scale    least, middle and largest value; hot voxels beyond the ends are clipped
@@ -64,7 +65,7 @@ class Neighbours:
 
 
 def neighbour_correlation(tiles: Sequence[Neighbours]) -> float:
-    """Return the correlation of neighbouring voxels: the larger of those along y and along x.
+    """Return the correlation of neighbouring voxels: the larger one of the two directions in plane.
 
     The larger one counts because a microscope's scan lines may differ by more than the structures.
     The correlation is 1 if it is unknown: without tiles or pairs, or if all voxels are equal.

@@ -34,8 +34,9 @@ class RepairOptions:
     alpha_um         radius of the ball that closes gaps; 0: gaps stay open
     min_diagonal_um  fragments with a smaller diagonal are dropped
     max_cavity_um    cavities with a smaller diagonal are filled
-    min_faces        fragments with fewer triangles are dropped too, ...
-    max_fragment_um  ... if their diagonal is less than this
+    min_faces        fragments with fewer triangles, and a diagonal below max_fragment_um, are
+                     dropped too
+    max_fragment_um  see min_faces; larger fragments stay, however few triangles they have
     offset_um        distance by which the surface moves outward; at most a voxel, because the field
                      is not a distance farther away
     """

@@ -50,7 +50,8 @@ class ComponentSums:
     voxels          of all components, specks included
     largest         of the largest component
     large_voxels    of the components that are not specks
-    thin_voxels     part of large_voxels that is too thin for the planes that carry the surface
+    thin_voxels     part of large_voxels that is too thin if the surface is extracted from only
+                    every k-th plane
     main_voxels     of the main components: at least MAIN_SHARE as large as the largest
     new_voxels      part of main_voxels in components that touch main components at a higher level,
                     but farther than REACH voxels from these; 0 without a higher level
@@ -86,7 +87,7 @@ def sum_components(
     spacing_um       (z, y, x)
     min_diagonal_um  components with a smaller diagonal (specks) are left out: noise has more of
                      them than a tile has bodies, and they would dominate the means
-    step             voxels (z, y, x) between planes that carry the surface
+    step             voxels (z, y, x) between the planes from which the surface is extracted
     higher           bool (z, y, x), {field > a higher iso-value}: shows what `inside` adds to it
     """
     components = find_components(inside, spacing_um, 26)

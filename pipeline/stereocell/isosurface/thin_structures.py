@@ -1,4 +1,4 @@
-"""Measure how much of a solid is too thin for a surface that only every k-th plane carries.
+"""Measure how much of a solid is too thin for a surface from only every k-th plane of voxels.
 
 A wall thinner than the distance between two such planes falls between them, and an oblique wall
 gets holes. A box of k + 1 voxels holds such a plane wherever it lies, and its corners cover a cell

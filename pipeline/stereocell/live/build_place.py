@@ -18,7 +18,7 @@ from stereocell.storage.lock import alone_in
 
 
 def free_place(plan: Plan) -> Path:
-    """Return a folder for a build, in the working folder and named after the specimen.
+    """Return the path for a build's folder, in the working folder and named after the specimen.
 
     If the working folder is itself the source, the new folder lies beside it, since nothing may be
     written into the data. The name gets a number if other specimens or files already have it.

@@ -1,7 +1,8 @@
 """Build a source in a process of its own, with lower priority, while its page is open.
 
-The two processes talk over a pipe. The build reports its tasks and the views that it writes; the
-server asks it to pause and to continue. A pause begins when the running tasks have ended.
+The two processes talk over a pipe. The build reports its tasks and the views that it writes, which
+are bundles of the part that is built (partial_view.py). The server asks it to pause and to
+continue. A pause begins when the running tasks have ended.
 Independently of pauses, the build rests for moments while somebody waits for a frame; see `rests`.
 """
 
@@ -47,7 +48,7 @@ SHARES = {
     "bundle": 0.08,
     "report": 0.13,
 }
-_PREDICTABLE = 0.15  # share from which the pace predicts the end: the start of a build is slow
+_PREDICTABLE = 0.15  # share of a build from which its pace predicts the end; its start is slow
 _NICE = 10  # niceness, 0 to 19; a larger one means lower priority
 _END_S = 15  # s that a cancelled build has to remove unfinished files
 _KILLED = "the build was stopped from outside"
@@ -218,7 +219,7 @@ class BuildProcess:
                 report = pipe.recv()
             except (EOFError, OSError):
                 report = None
-            if pipe is not self._pipe:  # a newer process builds by now
+            if pipe is not self._pipe:  # this process has ended, and another one builds meanwhile
                 return
             if report is None:
                 is_over = self.state.doing in ("cancelled", "failed", "complete")

@@ -13,14 +13,14 @@ LATE = "late"  # the frames of a page are late, and the build rests for a moment
 COMMANDS: tuple[Command, ...] = ("pause", "continue", "cancel")
 Doing = Literal[
     "unbuilt",  # no build was requested
-    "queued",  # the build waits for others
+    "queued",  # the build waits for other builds of an inbox
     "building",
     "pausing",
     "paused",
     "cancelled",
     "failed",
     "complete",
-    "deleted",  # together with its source
+    "deleted",  # the build was deleted together with its source
 ]
 
 

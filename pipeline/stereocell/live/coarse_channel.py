@@ -119,9 +119,10 @@ def grid_at(dataset: Dataset, plan: Plan, level: int, voxels: int) -> CoarseGrid
 def slabs_of(grid: CoarseGrid, axis: int) -> Iterator[tuple[Box, _Triple]]:
     """Yield each box of voxels to read, and the voxels (z, y, x) of a block in it.
 
-    axis  0, 1 or 2 for z, y or x: the axis across which the source's images lie
+    axis  0, 1 or 2 for z, y or x: the axis perpendicular to the source's images
 
-    All planes of a block are read. If the region has too many voxels, only the middle ones are.
+    All planes of a block are read. If the region has more than READ_VOXELS, only the planes in the
+    middle of each block are.
     """
     box, factor = grid.box, grid.factor
     count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
@@ -147,8 +148,8 @@ def read_coarse(
 
     on_read  called after each part that is read, with the part's share, 0..1
 
-    A large source without a pyramid is read by some planes of each block only, across the axis
-    along which its images lie. Raises SourceError if voxels can't be read.
+    In a large source without a pyramid, only some of the source's images in each block are read.
+    Raises SourceError if voxels can't be read.
     """
     grid = find_grid(dataset, plan, voxels)
     axis = dataset.slice_axis(grid.level)

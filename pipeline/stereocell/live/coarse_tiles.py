@@ -42,7 +42,7 @@ _GREYS = (_ALL, (255, 15), (127, 15), (63, 15))
 _SAMPLED, _EACH = (
     6,
     48,
-)  # for an estimate, the first number of planes is compressed out of the second
+)  # to estimate bytes, the first number of planes is compressed of each group of the second
 # Bytes of a texture with all mip levels, as a multiple of the finest level's bytes. Measured: 1.14
 # for noise, 1.2 for tissue.
 _MIPS = 1.17

@@ -1,4 +1,4 @@
-"""Read one tile of a source as finely as a build does, in 8 bits over a view's window."""
+"""Read one tile of a source as finely as a build does, in 8 bits over a display window."""
 
 from dataclasses import dataclass, replace
 from math import prod

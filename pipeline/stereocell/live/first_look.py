@@ -34,7 +34,7 @@ class FirstLook:
         loading = threading.Thread(target=load_kernels, daemon=True)
         loading.start()
         plan = settle(source, settings, choice, title=title)
-        # An import of USD would wait for ever for a thread that loads a library.
+        # An import of USD, which follows, would wait for ever for a thread that loads a library.
         loading.join()
         return cls(plan, open_source(as_asked(plan.source, plan.settings.plan)))
 

@@ -29,7 +29,7 @@ from stereocell.steps.unit_files import is_whole
 from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.written_files import STAGE_NAME
 
-REST = 10.0  # factor; views take at most about a tenth of the time of a build
+REST = 10.0  # default of `rest`: writing views takes at most about a tenth of a build's time
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ class Reading:
         """print_line: called with a line for a person from time to time."""
         self._print, self._adding = print_line, Lock()
         self._printed_s = time.monotonic()
-        self.share = 0.0  # 0..1
+        self.share = 0.0  # share of the source that has been read, 0..1
 
     def add(self, share: float) -> None:
         """Add a share, 0..1, of the source that has been read."""

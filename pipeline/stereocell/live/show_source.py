@@ -63,7 +63,7 @@ class Live:
     page     the folder of the viewer
     bundle   the folder of the first view; complete once `first` has a result
     first    done once the first view is written; holds the error if it can't be written
-    fine     reads tiles in view at full resolution; None if the views stay coarse
+    fine     reads the tiles that the camera sees at full resolution; None if views stay coarse
     build    the build that runs meanwhile; None if the source is only shown
     reading  the share that has been read for the first view
     """

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _D50 = np.array([0.9642, 1.0, 0.8249])  # XYZ of white under D50
-_RGB_OF_D50 = np.array(  # linear sRGB of XYZ under D50
+_RGB_OF_D50 = np.array(  # matrix for column vectors: from XYZ under D50 to linear sRGB
     [
         [3.1338561, -1.6168667, -0.4906146],
         [-0.9787684, 1.9161415, 0.0334540],

@@ -1,8 +1,8 @@
 """Find the plane of a source's images, and turn arrays so that the slices come first.
 
-A volume is turned into the patient's frame after reading, so the images of a CT may lie across any
-axis. Operations in the plane of an image (a median, the noise between neighbours, runs of padding)
-work on arrays that `slices_first` has turned.
+A volume is turned into the patient's frame after reading, so the images of a CT may be
+perpendicular to any axis. Operations in the plane of an image (a median, the noise between
+neighbours, runs of padding) work on arrays that `slices_first` has turned.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ MAX_RATIO = 2.0
 
 
 def find_slice_axis(stated: int, spacing_um: Spacing) -> int:
-    """Return the axis across which the images of a volume lie: 0, 1 or 2 for z, y, x.
+    """Return the axis perpendicular to the images of a volume: 0, 1 or 2 for z, y or x.
 
     stated      axis that the source states, or that its reader assumes
     spacing_um  voxel spacing (z, y, x)
@@ -34,12 +34,12 @@ def find_slice_axis(stated: int, spacing_um: Spacing) -> int:
 
 
 def slices_first(array: NDArray[Any], slice_axis: int) -> NDArray[Any]:
-    """Return a view of an array (z, y, x) as (slice, row, column)."""
+    """Return an array (z, y, x) as (slice, row, column), a NumPy view."""
     return np.moveaxis(array, slice_axis, 0)
 
 
 def slices_back(array: NDArray[Any], slice_axis: int) -> NDArray[Any]:
-    """Return a view of an array (slice, row, column) as (z, y, x)."""
+    """Return an array (slice, row, column) as (z, y, x), a NumPy view."""
     return np.moveaxis(array, 0, slice_axis)
 
 

@@ -120,5 +120,5 @@ class Lattice:
     def _plane(self, axis: int, place: float) -> Plane:
         zyx = np.zeros(3)
         zyx[axis] = place * self.spacing_um[axis] + self.origin_um[axis]
-        value = zyx_to_xyz(zyx).astype(np.float32)[2 - axis]  # rounded like vertices
+        value = zyx_to_xyz(zyx).astype(np.float32)[2 - axis]  # rounded to float32 like vertices
         return 2 - axis, float(value)

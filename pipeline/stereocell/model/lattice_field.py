@@ -48,7 +48,7 @@ class LatticeField:
         many = max(1, _AT_ONCE // max(1, field[:1].size))  # all planes in float64 would take GBs
         for z in range(0, len(field), many):
             some = columns[z : z + many]
-            for x, end in pairwise(cuts):  # between two centres
+            for x, end in pairwise(cuts):  # voxels x to end lie between the same two centres
                 a, b = some[..., low[x], None], some[..., high[x], None]
                 field[z : z + many, :, x:end] = a + (b - a) * share[x:end]
         return field

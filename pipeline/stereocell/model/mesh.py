@@ -50,7 +50,8 @@ class Quality:
     away, back  distances from the iso-surface to this mesh, and from this mesh to the iso-surface
     samples     number of points on each surface at which the distances were measured
     mended      components that were simplified again, because the first attempt had defects
-    fallbacks   components that kept the previous level's surface, because all attempts had defects
+    fallbacks   components that kept the surface of the next finer level of detail, because all
+                attempts had defects
     faults      defects that are left by the exact check (see `find_defects`)
     angle_deg   1st percentile of the triangles' smallest angles, degrees
     enclosed    share of the iso-surface's area that lies inside this mesh or on it, 0..1

@@ -37,7 +37,7 @@ class SharedInterfaces:
     """Interfaces between objects.
 
     labels    uint64 (m, 2), labels of the two objects
-    area_um2  float32 (m,), area at the finest level; NaN: not known
+    area_um2  float32 (m,), area at the finest level of detail; NaN: not known
     """
 
     labels: NDArray[np.uint64]
@@ -57,7 +57,8 @@ class ObjectTable:
     default  ID of the column that colours objects at first; empty: each has a hue of its own
     interfaces     int32 (m, 2): rows of two objects with a common interface, each pair once; None:
                    not known
-    interface_um2  float32 (m,), area of each interface at the finest level; NaN: not known
+    interface_um2  float32 (m,), area of each interface at the finest level of detail; NaN: not
+                   known
     colors   float32 (n, 3), linear RGB from the label map's file, NaN for an object without one;
              None: no object has one
     """

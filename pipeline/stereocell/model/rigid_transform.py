@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-Matrix = tuple[tuple[float, ...], ...]  # 4 rows of 4, for column vectors; the last column moves
+Matrix = tuple[tuple[float, ...], ...]  # 4 rows of 4, for column vectors; last column: translation
 IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
 
 

@@ -1,4 +1,4 @@
-"""A clock that adds up the seconds of each step."""
+"""A clock that adds up the seconds that each named part of the work takes."""
 
 import time
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 
 class Clock:
-    """A clock that adds up the seconds of each step: `with clock("extract"): ...`."""
+    """A clock that adds up the seconds of each part of the work: `with clock("extract"): ...`."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

@@ -108,7 +108,7 @@ class Unit:
     volume    uint8 (z, y, x): the lattice's voxels, window applied, and APRON voxels on every side;
               None for a label map
     reason    why there is no surface; empty: there is one
-    seconds   seconds spent, by step
+    seconds   seconds spent on each part of the work, such as `extract` (see Clock)
     measured  voxels of `volume` as measured; None: not kept, or equal to `volume`
     objects   measurements of a label map's objects; None for a channel of an image
     cover     how much of the source's voxels the solid encloses; None: there is no level, or this

@@ -16,7 +16,8 @@ class Volume:
     voxels      (z, y, x), integer or float32
     spacing_um  distance between voxels in um, (z, y, x)
     origin_um   CENTRE of voxel (0, 0, 0) in um, (z, y, x)
-    slice_axis  axis across the source's images: 0, 1 or 2 for z, y, x (model/image_plane.py)
+    slice_axis  axis perpendicular to the source's images: 0, 1 or 2 for z, y or x; see
+                model/image_plane.py
     """
 
     voxels: NDArray[Any]

@@ -1,4 +1,4 @@
-"""Survey each channel: choose one level, one repair and one appearance for all of its tiles.
+"""Survey each channel: choose one iso-level, one repair and one appearance for all of its tiles.
 
 This module reads no voxels. It sums up what the passes over the voxels found
 (building/passes.py), before the units are built.
@@ -40,7 +40,7 @@ KEPT_OF_MASK = 0.9  # share of a mask's voxels; a note warns if smoothing keeps 
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The level that was chosen for a channel by its connected components.
+    """The iso-level that was chosen for a channel by its connected components.
 
     found       the channel's levels; empty if all voxels lie on one side of the chosen level
     index       index of the chosen level in `found.candidates`

@@ -53,8 +53,8 @@ class Channel:
     source       source of this channel alone, which a command added to the plan. It has only the
                  planned level, and voxels in uint8 with the window 0..255. Empty: the plan's source
     fingerprint  fingerprint of that source
-    level        which of the found levels has the surface (`inner`), or a voxel value (`162`), or
-                 a value above the background (`162+b`); empty: the settings decide
+    level        iso-level of the surface: the name of a found level (`inner`), a voxel value
+                 (`162`), or a value above the background (`162+b`); empty: the settings decide
     base         name of the source's channel, if it has several surfaces and this is one of them;
                  empty: `name` is the source's channel
     """
@@ -136,7 +136,7 @@ def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> lis
             found.append(replace(channel, level=surfaces[0]))
             continue
         for place, surface in enumerate(surfaces):
-            # each further surface is lighter; if the channel's colour is pale, darker
+            # each further surface is lighter than the one before, or darker in a pale channel
             share, end = place / len(surfaces), float(min(channel.color) < _PALE)
             red, green, blue = (part + share * (end - part) for part in channel.color)
             found.append(

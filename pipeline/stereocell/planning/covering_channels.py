@@ -1,6 +1,6 @@
 """Build no surface of a channel that covers the specimen, because it would hide other surfaces.
 
-A background, or a marker of nearly all cells, has a level like any other channel. Its surface
+A background, or a marker of nearly all cells, has an iso-level like any other channel. Its surface
 wraps the whole block and hides the other surfaces, so the channel is drawn as a volume only. The
 criterion is the share of the region's voxels above the level, after smoothing and subtraction of
 the background. The channel's name does not matter.

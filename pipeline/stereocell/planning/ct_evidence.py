@@ -22,7 +22,7 @@ _AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MAX_HU = -1000.0, 150.0, 0.02, 4000.0
 _SOFT_HU, _SOFT_SHARE = (
     40.0,
     0.02,
-)  # soft tissue, and least share of voxels within _AIR_SPREAD of it
+)  # soft tissue in HU, and the least share (0..1) of a CT's voxels within _AIR_SPREAD of it
 LEVELS_HU = {"ct": -300.0, "ct-bone": 300.0}  # iso-value of each preset
 WINDOW_HU = (-1024.0, 2000.0)  # window of both presets
 _LIKE_HU = "values like Hounsfield units"

@@ -53,7 +53,7 @@ def settle_modality(
     Raises UsageError if a window in Hounsfield units is requested for other values.
     """
     code, note = dataset.modality or settings.plan.modality, ""
-    is_asserted = settings.plan.taken_as == HOUNSFIELD  # the user says so
+    is_asserted = settings.plan.taken_as == HOUNSFIELD  # the user says that values are HU
     if not dataset.has_hounsfield_units:
         settings, code = without_hounsfield(settings), ""
     elif not are_labels and is_asserted:

@@ -13,8 +13,10 @@ from stereocell.steps.open_source import SourceRef, open_source
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
 
-_first: dict[SourceRef, FileStates] = {}  # by reference, without the fingerprint
-_tables: dict[str, FileStates] = {}  # by the path in the settings
+# States of files when this process first opened them: of sources, by their reference without the
+# fingerprint, and of tables, by their path in the settings.
+_first: dict[SourceRef, FileStates] = {}
+_tables: dict[str, FileStates] = {}
 
 
 def as_asked(source: str, options: PlanOptions, *, fingerprint: str = "") -> SourceRef:
@@ -40,7 +42,7 @@ def reopen(ref: SourceRef) -> Dataset:
 
 
 def open_watched(ref: SourceRef) -> Dataset:
-    """Return the dataset, and record the state of its files the first time it is opened."""
+    """Return the opened dataset. The first time, record the state of its files, too."""
     dataset = open_source(ref)
     if _key(ref) not in _first:
         _first[_key(ref)] = FileStates.look(Location.of(ref.source), dataset.files)
@@ -48,7 +50,7 @@ def open_watched(ref: SourceRef) -> Dataset:
 
 
 def open_states(ref: SourceRef) -> FileStates:
-    """Return the state of the files when this process first opened them, now at the latest."""
+    """Return the state of the files when this process first opened them, opening them if needed."""
     open_watched(ref)
     return _first[_key(ref)]
 

@@ -16,7 +16,8 @@ from stereocell.read.statements import Statement, Subject, Trust, settle
 _MAX_ROUNDING = 1e-6  # elements of two rotation matrices that differ by less are equal
 _HALF = 0.5  # voxels; smaller differences between two grids come from rounding
 _NOUNS = ("plane{} (z)", "row{} (y)", "column{} (x)")
-_TURNED = ("voxel{} along z", "voxel{} along y", "voxel{} along x")  # axes of the patient
+# Words for images that lie in a patient: their canonical axes are not planes, rows and columns.
+_TURNED = ("voxel{} along z", "voxel{} along y", "voxel{} along x")
 _SPACING = Subject("voxel spacing (z, y, x)", "um")
 
 Triple = tuple[float, float, float]

@@ -83,7 +83,7 @@ def find_labels(
             )
         opened = _opened(image, source, name, place, settings.plan)
         title = name
-        if name == SELF:  # the file of a patient may bear the patient's name
+        if name == SELF:  # a patient's file is not named, since its name may be the patient's
             title = "labels" if image.has_sides else image.name
         channels = opened.dataset.channels
         several = len(channels) > 1  # readers return overlapping segments as several channels

@@ -1,4 +1,4 @@
-"""Choose the level of a channel's surface: the given one, one that was found, or a threshold."""
+"""Choose the iso-level of a channel: the given one, one that was found, or a threshold."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -104,7 +104,7 @@ def find_level(
     wants_cells = wanted == APART and _shows_cells(plan)
     if given is None and wants_cells and not levels.subtracts:
         # Cells in dim and in bright tissue rise equally far above the tissue. If nothing sparse
-        # rises above it, such a level would only show the tissue's own texture.
+        # rises above the tissue, a level above it would only show the tissue's own texture.
         above = find(subtracts=True)
         has_cells = any(level.share <= APART_MOST for level in above.clear)
         levels = above if has_cells else levels
@@ -336,7 +336,7 @@ def level_of_tile(
     judged = found.levels.judge_tile(level, tile_evidence)
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
         value = found.levels.level_of_tile(level, tile_evidence)
-    # A tile is never more confident than its channel. A tile compares the level with all voxels
-    # above it, a channel only with those up to the next level.
+    # A tile gets at most its channel's confidence. The tile's own may be too high: it compares the
+    # level with all voxels above it, the channel's only with voxels up to the next level.
     sure = None if judged is None else min(judged.confidence, level.confidence)
     return TileIso(value, below, sure, files)

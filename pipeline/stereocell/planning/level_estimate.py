@@ -1,4 +1,4 @@
-"""Estimate the level of each channel while the plan is made, from a few blocks, in a second.
+"""Estimate the iso-level of each channel while the plan is made, from a few blocks, in a second.
 
 `units` finds the level on all voxels. The plan states an estimate and the levels near it, before
 hours are spent on a build. Blocks at full resolution are better for that than a coarse resolution

@@ -1,4 +1,4 @@
-"""Write the plan's note on a channel's level, or on who finds it later."""
+"""Write the plan's note on a channel's iso-level, or on how the build will find it."""
 
 from stereocell.isosurface.channel_level import FEW_SHARE
 from stereocell.isosurface.level import Level
@@ -10,7 +10,9 @@ from stereocell.planning.level_choice import Found, explain_uncertainty, given_l
 from stereocell.planning.plan import Plan
 from stereocell.planning.survey import TileIso
 
-MARGIN = 0.1  # confidence; blocks estimate it so coarsely that a level this much below passes
+# Confidence by which a level that was estimated in blocks may lie below LOW_CONFIDENCE before the
+# note calls it unsure, since blocks estimate it coarsely.
+MARGIN = 0.1
 _CHOICES = {
     APART: "the one with the most separate pieces",
     CONNECTED: "the lowest at which vessels get longer and not only thicker",

@@ -19,7 +19,7 @@ from stereocell.planning.plan import Plan
 from stereocell.steps.labels import Labels
 
 AROUND = 0.5  # tiles; farthest that an uncut object reaches beyond its tile
-HALO = 42  # voxels; anything farther from an interface moves it by less than the lattice's step
+HALO = 42  # voxels; those farther from an interface move it by less than the lattice's step
 CUT = -1  # stands in place of a tile's index for an object that is cut
 
 
@@ -105,7 +105,7 @@ class Located:
         is_cut = self.owners[numbers] == CUT
         low[is_cut] = np.maximum(low[is_cut], own.start)
         high[is_cut] = np.minimum(high[is_cut], own.stop)
-        # objects end where the region does
+        # Voxels outside the region that is built are not read.
         first = [int(edges[0]) for edges in self.grid.edges]
         last = [int(edges[-1]) for edges in self.grid.edges]
         z0, y0, x0 = np.maximum(low.min(axis=0) - HALO, first).tolist()

@@ -1,4 +1,4 @@
-"""Find other levels at which a channel's surface could lie, each with the flag that chooses it."""
+"""Find other iso-levels at which a surface could lie, each with the flag that chooses it."""
 
 import shlex
 from collections.abc import Sequence

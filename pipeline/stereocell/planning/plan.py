@@ -35,7 +35,7 @@ from stereocell.steps.labels import Labels
 UNIT_VOXELS = 1 << 27  # voxels
 UNIT_TILES = 8  # tiles
 MIN_PLACES = 8  # fewest equal parts of half a voxel at which the caps of channels lie
-MIN_PLANES = 4  # fewest planes along each axis of a tile that carry the surface
+MIN_PLANES = 4  # fewest planes along each axis of a tile from which a surface is extracted
 
 
 class LevelLike(Protocol):
@@ -59,7 +59,8 @@ class Plan:
     modality        DICOM's code of the modality: `MR`, `CT`, ...; empty: not known
     placement       rows of a (4, 4) matrix, um. It maps column vectors of voxel world coordinates
                     (volume.zyx_to_xyz) to the specimen's place
-    slice_axis      axis across the source's images: 0, 1 or 2 for z, y, x (model/image_plane.py)
+    slice_axis      axis perpendicular to the source's images: 0, 1 or 2 for z, y or x
+                    (model/image_plane.py)
     has_sides       whether the source states where the patient's left, back and head are. Then the
                     specimen's place is the patient's world (read/anatomical_axes.py)
     labels          label maps whose objects are built, besides `channels`
@@ -99,11 +100,11 @@ class Plan:
 
     @property
     def step(self) -> tuple[int, int, int]:
-        """The distance in voxels (z, y, x) between planes that carry the surface."""
+        """The distance in voxels (z, y, x) between the planes from which surfaces are extracted."""
         return _step_of(self.settings.surface.grid_um, self.spacing_um)
 
     def with_grid(self, grid_um: float) -> "Plan":
-        """Return the plan for surfaces whose planes lie `grid_um` apart."""
+        """Return the plan for surfaces that are extracted from planes `grid_um` apart."""
         if grid_um == self.settings.surface.grid_um:
             return self
         surface = replace(self.settings.surface, grid_um=grid_um)

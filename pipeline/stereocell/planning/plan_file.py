@@ -53,7 +53,7 @@ def from_json(content: Mapping[str, Any], remedy: str = _AGAIN) -> Plan:
     try:
         plan = _adapter().validate_python({**content, **own})
         fault = _find_fault(plan)
-    except ValidationError as error:  # text with half a surrogate pair
+    except ValidationError as error:  # the schema accepts a lone surrogate in a text, pydantic not
         first = error.errors(include_url=False)[0]
         fault = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
     if fault is not None:

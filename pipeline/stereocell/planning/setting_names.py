@@ -50,7 +50,7 @@ def in_settings(line: str, *, has_sections: bool = True) -> str:
     for flag, place, _ in flagged_settings():
         place = place if has_sections else place[-1:]
         named = rf"(?<![\w-]){flag.name}(?![\w-])"
-        if has_sections and len(place) == 1:  # the channel's name follows the flag
+        if has_sections and len(place) == 1:  # a setting by channel, whose name follows the flag
             line = re.sub(rf"{named} (?!names |is |says )(?=\S)", f"{place[0]}.", line)
         line = re.sub(named, ".".join(place), line)
     return re.sub(r"(?<![\w-])--(preset|config|workers|scheduler)\b", r"\1", line)

@@ -512,7 +512,7 @@ def _read(path: Path) -> dict[str, Any]:
             f"{path}: line {line}: found byte 0x{content[error.start]:02x}, expected UTF-8: save "
             "the file as UTF-8"
         ) from None
-    except (ValueError, RecursionError) as error:  # also numbers too large for Python
+    except (ValueError, RecursionError) as error:  # ValueError: invalid TOML, or too large a number
         raise UsageError(f"{path}: this is not TOML: {error!s:.200}") from None
 
 

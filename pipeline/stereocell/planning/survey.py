@@ -1,4 +1,4 @@
-"""The results of the survey for each channel: its window, level, repair and appearance.
+"""The results of the survey for each channel: its window, iso-level, repair and appearance.
 
 pydantic turns the dataclasses into plain values and back, as survey.json holds them.
 """
@@ -26,7 +26,7 @@ _LEVELS = Field(validation_alias=AliasChoices("levels", "ladder"))  # surveys of
 
 @dataclass(frozen=True, slots=True)
 class TileIso:
-    """The level of a channel in one tile.
+    """The iso-level of a channel in one tile.
 
     value       level above the background, in voxel values; None: the channel has no surface
     background  mean over the tile, voxel values; 0: none is subtracted
@@ -57,7 +57,7 @@ class ChannelSurvey:
     levels           all levels that were found, outermost first; empty if the level was given
     curve            the histogram in which they were found; None if the level was given
     holder           a CT's table or head holder, which is left out; None: there is none
-    grid_um          distance between the planes that carry the surface, um; 0: all planes do
+    grid_um          um between the planes from which the surface is extracted; 0: all planes
     most_faces       most voxel faces of the surface in one tile, before planes are left out
     thin_share       share of the voxels above the level that lie in structures too thin for planes
                      surface.grid_um apart
@@ -120,7 +120,7 @@ def is_body(appearance: Appearance, statistics: ChannelStatistics) -> bool:
     return above >= BODY_SHARE * int(counts.sum())
 
 
-Survey = dict[str, ChannelSurvey]  # by channel ID
+Survey = dict[str, ChannelSurvey]  # the survey of each channel, by channel ID
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Find the level of vessels: the lowest level that still adds branches, and no tissue or noise.
+"""Find the iso-level of vessels: the lowest that still adds branches, and no tissue or noise.
 
 A level half-way between blood and tissue is right for a wide vessel. A vessel as thin as a voxel
 has only a fraction of that brightness, so this level cuts a tree into its trunk and fragments.

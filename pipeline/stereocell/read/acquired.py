@@ -1,4 +1,4 @@
-"""The images that a source stores: the axis across which they lie, and their places in the grid."""
+"""The images that a source stores: the axis perpendicular to them, and their places in the grid."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from stereocell.read.anatomical_axes import Canonical
 class Acquired:
     """The planes that a source stores.
 
-    axis   index of z, y, x: the axis across which the images lie
+    axis   0, 1 or 2 for z, y or x: the axis that is perpendicular to the images
     first  float64 (n, 3): the first pixel of each image, (z, y, x) in voxels of the grid; images
            are in rising order along `axis`. None: the images are the grid's planes
     load   returns the n images of a time point with the grid's axes (z, y, x), stacked along
-           `axis`; None: `first` is None
+           `axis`; None where `first` is None
     """
 
     axis: int = 0

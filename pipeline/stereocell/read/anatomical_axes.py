@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from stereocell.model.rigid_transform import Matrix, to_matrix
 from stereocell.model.spacing import Spacing
 
-_CANONICAL = np.array([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])  # A, I, L in LPS
-LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])  # (3, 3) for columns
+# rows: directions of canonical z, y and x (anterior, inferior, left) in LPS
+_CANONICAL = np.array([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])
+# (3, 3) for column vectors: from LPS to the world
+LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])
 _UM_PER_MM = 1000.0
 _PLANES = ("sagittal", "coronal", "axial")  # indexed by the LPS axis nearest to the normal
 _OBLIQUE = np.cos(np.radians(2.0))  # cosine; a normal farther from its axis makes the plane oblique
@@ -29,8 +31,8 @@ _OBLIQUE = np.cos(np.radians(2.0))  # cosine; a normal farther from its axis mak
 class Canonical:
     """The map from stored axes to canonical ones.
 
-    order       stored axis that becomes z, y, x
-    flips       True where z, y, x run backwards along the stored axis
+    order       for z, y and x: index (0..2) of the stored axis that becomes this axis
+    flips       for z, y and x: True where the axis runs backwards along its stored axis
     spacing_um  (z, y, x), um
     placement   rows of a (4, 4) matrix for column vectors, um: from the pipeline's world, whose
                 origin is the centre of canonical voxel (0, 0, 0), to the patient's world
@@ -42,7 +44,7 @@ class Canonical:
     placement: Matrix
 
     def apply(self, voxels: NDArray[np.generic]) -> NDArray[np.generic]:
-        """Return stored voxels (three axes, any dtype) as a canonical view (z, y, x)."""
+        """Return stored voxels (three axes, any dtype) on canonical axes (z, y, x), not copied."""
         turned = voxels.transpose(self.order)
         return turned[tuple(slice(None, None, -1 if flip else 1) for flip in self.flips)]
 
@@ -55,7 +57,7 @@ def canonical_of(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> Ca
     """
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     axes = affine[:3, :3] / spacing
-    likeness = _CANONICAL @ axes  # absolute cosines; rows: canonical axes, columns: stored axes
+    likeness = _CANONICAL @ axes  # signed cosines; rows: canonical axes, columns: stored axes
     best = max(permutations(range(3)), key=lambda p: sum(abs(likeness[i, p[i]]) for i in range(3)))
     order = (best[0], best[1], best[2])
     backwards = [bool(likeness[i, axis] < 0) for i, axis in enumerate(order)]

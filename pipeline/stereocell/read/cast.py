@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TAKEN = ("uint8", "uint16", "int16", "float32")  # accepted by builds
+TAKEN = ("uint8", "uint16", "int16", "float32")  # number types that builds accept
 _CAST = {
     "bool": "uint8",
     "int8": "int16",

@@ -32,7 +32,7 @@ def touched_along(size: int, ranges: Sequence[range]) -> list[int]:
 
 
 def number_of(sizes: Sequence[int], spans: Spans) -> int:
-    """Return the number of chunks that a part touches. `sizes`: of a chunk along each axis."""
+    """Return how many chunks a part touches. `sizes` holds a chunk's length along each axis."""
     return math.prod(_count(n, ranges) for n, ranges in zip(sizes, spans, strict=True))
 
 

@@ -123,7 +123,7 @@ class Dataset:
     has_sides    whether the source states where the patient's left, back and head are; False where
                  the subject isn't a patient or the reader had to guess
     remarks      changes and omissions of the reader, a sentence each
-    acquired     the axis across which the source's own images lie
+    acquired     the axis that is perpendicular to the source's own images, and their places
     labels       the metadata that says that voxels number objects; empty: none does
     objects      the file's own notes on these objects
     files        paths or addresses of all files and folders that the source is read from
@@ -216,7 +216,7 @@ class Dataset:
         return Volume(voxels, place.spacing_um, (z, y, x), self.slice_axis(level))
 
     def slice_axis(self, level: int = 0) -> int:
-        """Return the axis (of z, y, x) across which the images of a level lie."""
+        """Return the axis perpendicular to a level's images: 0, 1 or 2 for z, y or x."""
         return find_slice_axis(self.acquired.axis, self.levels[level].spacing_um)
 
     @property

@@ -9,7 +9,7 @@ def require_installed(library: str, extra: str, where: str, title: str) -> None:
     """Raise SourceError, with the command that installs the library, if it is missing."""
     try:
         is_there = find_spec(library) is not None
-    except ValueError:  # the module has no spec
+    except ValueError:  # a loaded module without a spec counts as missing
         is_there = False
     if not is_there:
         raise SourceError(

@@ -29,7 +29,7 @@ def require_kind(location: Location, format: Format) -> None:
         return
     head = first_bytes(path, count=_HEAD_BYTES)
     if not head and os.path.getsize(path):
-        return  # the file can't be read
+        return  # the reader reports a file that can't be read
     content = identify(head)
     if format.folder_endings:
         if format.holds is None or not format.holds(location):

@@ -52,7 +52,8 @@ FOREIGN = (
 )  # fmt: skip
 _PHILIPS = "dcm2niix makes NIfTI of the pair"
 _VOXELS = (".raw", ".vol", ".bin", ".dat")
-_SIDECARS = (".vgi", ".info", ".vol.info", ".raw.info")  # written by VGStudio and PyHST
+# endings of the headers that VGStudio and PyHST write beside a file of voxels
+_SIDECARS = (".vgi", ".info", ".vol.info", ".raw.info")
 
 
 def foreign_words(path: str, *, only_other: bool = False) -> str:

@@ -71,9 +71,10 @@ class Format:
     is_unmarked      returns whether a file, by its path and first bytes, may have this format
                      although it has none of its marks
     packed_endings   endings of files that are compressed by gzip; their content is checked
-    count_absent     counts the chunks of a part of an array that are not stored; None: all are
+    count_absent     counts the chunks of a part of an array that are not stored; None: the format
+                     has no absent chunks
     read_free_labels returns the free text by which a label map names each object
-    name, module     of the module that holds the row; `known_formats` fills them in
+    name, module     name and import path of the row's module; `known_formats` fills them in
     """
 
     title: str

@@ -18,7 +18,7 @@ MAX_CHANNELS = 10_000  # a source with more channels is refused
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """The first image of a source.
+    """The chosen image of a source, as its reader returns it.
 
     arrays, grids  one for each level, finest first
     names, colors  one for each channel; None: not stated. Colours are linear RGB, 0..1

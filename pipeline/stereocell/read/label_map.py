@@ -74,7 +74,7 @@ class LabelMap:
 
     def _whole(self, stored: NDArray[np.floating]) -> NDArray[np.int64]:
         numbers = np.where(np.isnan(stored), 0, stored)
-        if numbers.dtype == np.float16:  # float16 can't represent the limit
+        if numbers.dtype == np.float16:  # float16 can't represent _MAX_EXACT
             numbers = numbers.astype(np.float32)
         is_whole = (np.abs(numbers) < _MAX_EXACT) & (np.floor(numbers) == numbers)
         if not is_whole.all():

@@ -14,7 +14,7 @@ from stereocell.read.stated_numbers import number_of
 
 _MAX_LABELS = 1_000_000  # objects; notes on further objects are not read
 _MAX_XML = 1 << 22  # bytes of a header extension; longer ones are not parsed
-_LONGEST = 200  # characters of a name or a text
+_LONGEST = 200  # characters; longer names and texts are cut
 
 
 def notes_of_ngff(image_label: Any) -> ObjectNotes:

@@ -42,7 +42,7 @@ def _contradiction(finest: Grid, grid: Grid, axis: int) -> tuple[float, Trust] |
         return None
     own, coarse = finest.spacing_um[axis], grid.spacing_um[axis]
     if not own > 0 or not coarse > 0:
-        return None  # other modules refuse such a spacing
+        return None  # other modules refuse a spacing that is not positive
     fine, count = finest.shape[axis], grid.shape[axis]
     if abs(fine * own / coarse - count) <= _ROUNDING:
         return None

@@ -25,9 +25,9 @@ from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Image
 from stereocell.read.series import Candidate, candidate, choose
 
-_MOST = 10_000  # most values along one axis
+_MOST = 10_000  # values along one axis; an annotation with more is ignored
 _LONGEST = 20  # characters of a type or a label that a message shows
-_COMPARED = 8  # pairs of planes that are compared
+_COMPARED = 8  # pairs of planes that are compared to find the order of the values
 _PLURALS = {"phase": "phases", "lambda": "wavelengths", "lifetime": "lifetimes"}
 
 

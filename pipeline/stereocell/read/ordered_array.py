@@ -21,7 +21,7 @@ class OrderedArray:
         self._array, self._axis, self._order = array, axis, tuple(order)
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
-        """Return voxels by whole numbers and slices."""
+        """Return the voxels at whole numbers and slices, which count in the new order."""
         part = key[self._axis]
         if not isinstance(part, slice):
             return np.asarray(self._array[self._placed(key, self._order[int(part)])])

@@ -15,7 +15,7 @@ import zlib
 from typing import IO, Protocol
 
 PACKINGS = ("zlib", "gzip", "bzip2", "xz")
-_PIECE = 1 << 24  # bytes; unpacked at once
+_PIECE = 1 << 24  # bytes that are unpacked at a time
 _MOST_BEHIND = 1 << 32  # bytes unpacked behind the last voxel; a stream with more is refused
 _MEMBER = b"\x1f\x8b"  # first bytes of each member of a gzip stream
 _AGAIN = "copy or download it again"

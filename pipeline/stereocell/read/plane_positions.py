@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
-_EVEN = 0.1  # share of the mean by which a step may differ: rounding and the precision of a drive
+_EVEN = 0.1  # share of the mean step by which one may differ: rounding, precision of a drive
 _TOLERANCE = 0.01  # relative difference up to which two depths agree
 _MOST_APART = 50.0  # ratio of two depths; a larger one is due to a wrong unit
 _MOST_ASIDE = 0.5  # voxels by which planes may lie beside each other without a note

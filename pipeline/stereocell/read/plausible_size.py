@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-_WIDEST_MM = 12.0  # mm between voxels; PET and SPECT have up to 10 mm
-_LEAST_MM = 1.0  # mm across a whole volume; scanners have more
+_WIDEST_MM = 12.0  # mm; a note is written if the finest spacing is wider. PET has up to 10
+_LEAST_MM = 1.0  # mm; a note is written if the longest edge of a volume is shorter
 
 _LONGEST_PIXEL = 30.0  # length of a pixel over its width; OCT and line scans reach about 10
 _THICKEST_SLICE = 300.0  # distance between slices over the length of a pixel; sections reach 100
-_THINNEST_SLICE = 1 / 30.0  # the same ratio; oversampled light-sheet stacks reach 1/4
+_THINNEST_SLICE = 1 / 30.0  # least such ratio; oversampled light-sheet stacks reach 1/4
 _QUESTION = "is the unit of one of them wrong? (--spacing-um z,y,x replaces it)"
 
 
@@ -15,7 +15,7 @@ def ratio_notes(spacing_um: Sequence[float], slice_axis: int) -> tuple[str, ...]
     """Return a note if voxels are implausibly longer along one axis than along another.
 
     spacing_um  (z, y, x)
-    slice_axis  index of z, y, x: the axis across which the images lie
+    slice_axis  0, 1 or 2 for z, y or x: the axis that is perpendicular to the images
     """
     rows, columns = (n for n in range(3) if n != slice_axis)
     long, short = sorted((rows, columns), key=lambda n: -spacing_um[n])

@@ -23,7 +23,7 @@ _SURFACES = (
     *(".usda", ".usdc", ".usdz"),
 )
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp")  # images in a folder may be the planes of a volume
-# endings that MetaImage and NRRD use
+# endings of MetaImage's and NRRD's separate files of voxels, and of the headers beside them
 _VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")
 
 

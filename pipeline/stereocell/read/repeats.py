@@ -74,7 +74,7 @@ def record_json(text: str | bytes, source: str) -> None:
     try:
         json.loads(text, object_pairs_hook=pairs)
     except (ValueError, RecursionError):
-        return  # the reader refuses the text with its own message
+        return  # the reader refuses invalid JSON with its own message
 
 
 def record_xml(root: ElementTree.Element, source: str) -> None:

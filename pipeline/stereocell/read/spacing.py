@@ -15,8 +15,8 @@ PartialTriple = tuple[float | None, float | None, float | None]
 _UM: dict[str, float] = {
     "angstrom": 1e-4,
     "\u00c5": 1e-4,
-    "\u00e5": 1e-4,  # the same letter in lower case
-    "\u212b": 1e-4,  # the sign of the unit, a character of its own
+    "\u00e5": 1e-4,  # lower case of the letter above
+    "\u212b": 1e-4,  # the angstrom sign, which is not the letter
     "\u00e5ngstrom": 1e-4,
     "\u00e5ngstr\u00f6m": 1e-4,
     "A": 1e-4,
@@ -143,7 +143,8 @@ def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> t
         spacing = _triple(s * f for s, f in zip(finest, factors, strict=True))
         origin = _triple(0.5 * (f - 1.0) * s for s, f in zip(finest, factors, strict=True))
         if grid.offset_um is not None and grids[0].offset_um is not None:
-            # Measured in level 0's own spacing, so that a spacing given by the user scales it too.
+            # The stated offset is counted in stated spacings of level 0, so that a spacing that the
+            # user gives scales the offset, too.
             stated = grids[0].spacing_um or finest
             shifts = zip(grid.offset_um, grids[0].offset_um, stated, finest, strict=True)
             origin = _triple((a - b) / own * used for a, b, own, used in shifts)

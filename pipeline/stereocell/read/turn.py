@@ -14,8 +14,8 @@ from stereocell.read.spacing import Grid, Triple
 class Turn:
     """The order and direction in which stored axes become z, y and x.
 
-    order  stored axis (0 z, 1 y, 2 x) that becomes z, y, x
-    flips  True where z, y, x run backwards along the stored axis
+    order  for z, y and x: index of the stored axis (0 z, 1 y, 2 x) that becomes this axis
+    flips  for z, y and x: True where the axis runs backwards along its stored axis
     """
 
     order: tuple[int, int, int] = (0, 1, 2)
@@ -60,7 +60,7 @@ def turned_grid(grid: Grid, turn: Turn | Canonical) -> Grid:
 
 
 def turned_image(image: Image, turn: Turn) -> Image:
-    """Return an image with turned levels, and with the axis across which its planes now lie."""
+    """Return an image with turned levels, and with the axis now perpendicular to its planes."""
     if not turn.is_needed:
         return image
     return replace(

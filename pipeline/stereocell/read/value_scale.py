@@ -152,7 +152,7 @@ def _gaps(
             )
     missing = tuple(dict.fromkeys(value for values in fills.values() for value in values))
     if stored.kind in "iu" and scale.slope > 0 and missing == (_least(stored, scale),) == (0.0,):
-        missing, fills = (), {}  # 0 in unsigned numbers is the smallest value anyway
+        missing, fills = (), {}  # this mark, 0, is the smallest value, as which it would be read
     low, high = _range(stored, scale, attributes)
     shown = [f"{name} {', '.join(f'{v:g}' for v in values)}" for name, values in fills.items()]
     if low > -np.inf or high < np.inf:

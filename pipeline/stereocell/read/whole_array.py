@@ -19,7 +19,7 @@ class WholeArray:
     """Time points of one volume, (t, z, y, x); the last one that was read is cached.
 
     shape  (t, z, y, x) in voxels
-    load   returns the voxels (z, y, x) of a time point; it may return a view
+    load   returns the voxels (z, y, x) of a time point; they may be a NumPy view of a larger array
     """
 
     def __init__(

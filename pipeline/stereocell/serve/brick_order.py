@@ -1,9 +1,9 @@
-"""The bricks that a view needs, in the order of their screen-space error.
+"""The bricks that a camera's view needs, in the order of their screen-space error.
 
 A brick's worth is the cost of its absence, in which case its parent is shown. It is the product of
 the parent's error, the size of the brick's box on the screen, and a weight that falls off from the
-gaze's direction. A brick never
-comes before its parent: its worth is at most the parent's, and a tie puts the coarser brick first.
+gaze's direction. A brick never comes before its parent: its worth is at most the parent's, and a
+tie puts the coarser brick first.
 
 References: Guthe & Strasser, "Advanced techniques for high-quality multi-resolution volume
 rendering", Computers & Graphics 28(1), 2004, https://doi.org/10.1016/j.cag.2003.10.018
@@ -32,7 +32,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A view, with the fields of the message `view`; vectors (x, y, z) in um of the world.
+    """A client's camera, with the fields of the message `view`; vectors (x, y, z) in um, world.
 
     clip               (4, 4) for column vectors; row i, column j
     pixels_per_radian  resolution of the screen

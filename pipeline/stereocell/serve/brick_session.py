@@ -1,4 +1,4 @@
-"""One client's websocket `/bricks`: it sends the bricks of the client's view, coarse to fine.
+"""One client's websocket `/bricks`: it sends the bricks that the camera needs, coarse to fine.
 
 Three tasks share a connection: one reads messages, one opens (or builds) trees, one sends. Slow
 work runs in threads, so that no client waits for another's. The unacknowledged bytes never exceed
@@ -57,7 +57,7 @@ from stereocell.serve.limits import (
 from stereocell.serve.message_reader import MessageReader
 from stereocell.serve.tree_files import BrickFile, FullError
 
-_AHEAD = 2048  # bricks considered for one frame
+_AHEAD = 2048  # bricks that are considered for one websocket frame
 _LOG = logging.getLogger(__name__)
 T = TypeVar("T")
 
@@ -68,7 +68,7 @@ class BrickEndpoint:
     def __init__(self) -> None:
         self._builder = ThreadPoolExecutor(1, "bricks-build")
         self._quick = ThreadPoolExecutor(2, "bricks-read")
-        self._connections: Counter[str] = Counter()  # by the client's address
+        self._connections: Counter[str] = Counter()  # number of connections by client's address
 
     async def talk(self, socket: WebSocket, library: BrickLibrary) -> None:
         """Talk to one client of a library until it leaves or is closed."""
@@ -87,7 +87,7 @@ class BrickEndpoint:
             counts += Counter()  # this addition removes entries of 0
 
     def close(self) -> None:
-        """End the threads after the work that they are doing now; drop the rest."""
+        """End the threads after the work that they are doing now; drop work that waits."""
         self._builder.shutdown(wait=False, cancel_futures=True)
         self._quick.shutdown(wait=False, cancel_futures=True)
 
@@ -114,7 +114,7 @@ class _Tree:
 
 @dataclass(slots=True)
 class _Running:
-    """A view in progress.
+    """The camera view whose bricks are being sent.
 
     order  int64 (3, n): number of the tree, node, bytes of the brick; None until it is computed
     files  the open file of each tree that the order names, by the tree's number

@@ -77,7 +77,7 @@ class GuardedHttp(HeadDeadline):
         self._is_counted = self._clients.enter(self._address)
         if not self._is_counted:
             self._refuse(_RefusedError(503, "too many connections are open, try again later"))
-            self.transport.close()  # a lingering socket would use up what has run out
+            self.transport.close()  # at once, since sockets or connections have run out
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._is_counted:

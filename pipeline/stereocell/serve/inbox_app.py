@@ -46,7 +46,7 @@ _PAGE = "inbox.html"
 _OFFSET = "Upload-Offset"
 _SLICE = re.compile(r"slices/[xyz]\.png")
 _STATE_EVERY_S = 0.25  # s between two checks for a new state
-_MAX_VIEWS = 16  # most views whose applications are cached
+_MAX_VIEWS = 16  # most items whose views' applications are cached; the oldest is dropped
 _HEADERS = {"Cache-Control": "no-store", **policy("application/json")}
 # Files of the viewer that are not served at /: there they would replace the inbox's own page.
 _OF_VIEWER = ("/index.html", "/sw.js")
@@ -156,7 +156,7 @@ class InboxApp:
         except RefusedError as error:
             return self._with_offset(item, error)
         try:
-            with suppress(ClientDisconnect):  # the bytes that have arrived stay
+            with suppress(ClientDisconnect):  # bytes that arrived before the client left stay
                 async for data in request.stream():
                     await run(write, data)
         except RefusedError as error:

@@ -57,7 +57,7 @@ class InboxServer(Server):
         self._invite_uploader()
 
     def invite(self) -> None:
-        """Print the code for looking."""
+        """Print the QR code that admits a device that may only look, not upload."""
         if self.gate is not None:
             self.invite_by(self.gate, _VIEWING, {MAY_UPLOAD: False})
 

@@ -39,7 +39,7 @@ class Lifetime(uvicorn.Server):
     ) -> None:
         """Configure a server.
 
-        context  for TLS; None for plain HTTP
+        context  TLS context; None for plain HTTP
         on_wait  called at the stop with the number of transfers that may still finish
         """
         super().__init__(config)
@@ -50,7 +50,7 @@ class Lifetime(uvicorn.Server):
         self._handshakes: set[asyncio.Task[None]] = set()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Listen on bound sockets."""
+        """Begin to accept connections on bound sockets, with TLS if the server has a context."""
         await self.lifespan.startup()
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(_report_fault)
@@ -130,7 +130,7 @@ class Lifetime(uvicorn.Server):
 
 
 class _BeforeTls(asyncio.Protocol):
-    """A connection before TLS."""
+    """A new connection to a server with TLS. It begins the TLS handshake."""
 
     def __init__(self, start_tls: Callable[[asyncio.Transport], None]) -> None:
         self._start_tls = start_tls

@@ -167,5 +167,5 @@ class LiveApp:
 
 
 def _first_of(path: str) -> str:
-    """Return the first part of a path, as `g1`."""
+    """Return the first name in a path, such as `g1` of `/g1/bricks`."""
     return path.lstrip("/").partition("/")[0]

@@ -1,8 +1,7 @@
 """Answer with the measured value of a voxel: `GET /values/<tile>/<channel>?at=x,y,z`.
 
-A bundle stores intensities in 8 bits; the stage beside it in OUT has the source's values.
-The list volumes.json names, by its hash, the file of the stage that belongs to a volume. If the
-stage's list
+A bundle stores intensities in 8 bits; the stage beside it in OUT has the source's values. The list
+volumes.json names, by its hash, the file of the stage that belongs to a volume. If the stage's list
 has another file there, as after a new build, the server gives no value. `at` is in um, in the
 volume's own space (before its matrix). The answer is {"value": ...} for the voxel that contains the
 place, and null if the stage stores no value there.
@@ -29,7 +28,7 @@ from stereocell.storage.file_list import find_faults, read_list
 VALUES_HEADER = {"Stereocell-Values": "version=1"}  # announces /values to a page
 _LIST = "files.json"  # the stage's list of files
 _OPEN_FILES = 32  # most files that stay open
-_LONGEST = 200  # most characters of `at` that are read
+_LONGEST = 200  # characters of `at` that are read at most
 _HEADERS = {"Cache-Control": "no-store", **policy("application/json")}
 
 

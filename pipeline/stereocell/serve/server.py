@@ -1,7 +1,7 @@
 """Serve a built bundle and its bricks: `stereocell view` and `stereocell serve`.
 
 A static bundle works on any web host. This server adds three things to it. It answers byte ranges
-of files. Its websocket `/bricks` sends the parts of volumes that a view needs
+of files. Its websocket `/bricks` sends the parts of volumes that a camera needs
 (serve/brick_session.py). `/values` returns measured values from the stage beside the bundle
 (serve/measured_values.py).
 
@@ -41,7 +41,7 @@ from stereocell.serve.static_files import ShrunkError
 from stereocell.serve.websocket_protocol import GuardedSocket
 
 LOCALHOST = "127.0.0.1"
-_OWN_NAMES = (LOCALHOST, "localhost")  # with any port, since a tunnel may forward another one
+_OWN_NAMES = (LOCALHOST, "localhost")  # hosts; any port is accepted, since a tunnel may change it
 
 
 def serve(
@@ -286,7 +286,7 @@ def print_json(content: Mapping[str, object]) -> None:
 def _bind(host: str, port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
-        if sys.platform != "win32":  # with this option, Windows would share a port that is in use
+        if sys.platform != "win32":  # with SO_REUSEADDR, Windows would share a port that is in use
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
         listener.listen(128)

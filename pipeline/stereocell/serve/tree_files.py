@@ -127,7 +127,7 @@ class TreeFiles:
         """most_bytes: limit for all trees in the folder together; None for no limit."""
         self._folder, self._most = folder, most_bytes
         self._open: OrderedDict[tuple[str, str, str], BrickFile] = OrderedDict()
-        self._bytes: OrderedDict[str, int] = OrderedDict()  # by name; the last used is at the end
+        self._bytes: OrderedDict[str, int] = OrderedDict()  # bytes by file name, last used at end
         self._held: dict[object, frozenset[str]] = {}
         self._building = Lock()  # one tree is built at a time
         self._caching = RLock()

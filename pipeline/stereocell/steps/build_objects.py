@@ -29,7 +29,7 @@ from stereocell.textures.sample_channel import sample_channel
 class Image:
     """An image channel that is measured over objects.
 
-    region  voxels of the channel that are built
+    region  box (z, y, x) of the channel's voxels that is built
     """
 
     voxels: Voxels

@@ -1,7 +1,8 @@
 """Make closed copies of tiles, for 3D printing and for boolean operations.
 
 The drawn mesh of a tile is open towards its neighbours. The copy ends there in a cap, less than a
-voxel past the cut. Neighbours overlap by that, so that their union has no coincident faces.
+voxel past the cut. So the copies of neighbouring tiles overlap, and their union has no coincident
+faces.
 
 A copy is checked like every mesh. If simplification leaves defects, the copy is not simplified.
 """

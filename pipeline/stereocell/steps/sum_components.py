@@ -26,7 +26,7 @@ class SumComponents(Step[Sums]):
     background       background near the tile, voxel values; None: none is subtracted
     min_diagonal_um  smaller components are left out, um
     max_shift        most that smoothing may move a value, in voxel values; None: no bound
-    step             distance in voxels (z, y, x) between planes that carry the surface
+    step             voxels (z, y, x) between the planes from which the surface is extracted
     higher           higher level with which `iso` is compared, in the same values; None: none
     """
 

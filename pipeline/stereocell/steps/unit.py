@@ -67,7 +67,7 @@ class UnitInput:
     iso         iso-value near the tile, above the background, voxel values; None: no surface
     background  background in voxel values; None: nothing is subtracted
     repair      cleaning of the channel's surface
-    step        distance in voxels (z, y, x) between planes that carry the surface
+    step        voxels (z, y, x) between the planes from which the surface is extracted
     intensity_window  voxel values that become 0 and 255
     painted     voxel values of the painted channel that become 0 and 1; None: none is painted
     holder      a CT's table or head holder, left out of surface and volume; None: there is none
@@ -205,7 +205,7 @@ def _extract(
 
 
 class _Shading:
-    """Ambient occlusion and the painted channel, at the vertices and in the maps of all levels.
+    """Ambient occlusion and painted channel, at vertices and in maps of all levels of detail.
 
     The distance field is kept only if there are maps. Otherwise the solid is enough, which takes a
     quarter of its memory.

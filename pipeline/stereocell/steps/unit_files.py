@@ -164,7 +164,7 @@ def load_lods(directory: Path) -> tuple[Lod, ...]:
 
 
 def load_quality(stored: Mapping[str, Any]) -> Quality:
-    """Return the quality of one level from its entry in a record."""
+    """Return the quality of one level of detail from its entry in a record."""
     ways = {way: Spread(**stored[way]) for way in ("away", "back")}
     return Quality(**{**stored, **ways})
 
@@ -255,7 +255,7 @@ def _describe_closed(closed: Closed | None) -> dict[str, int] | None:
 
 
 def _describe_maps(lod: Lod) -> dict[str, Any]:
-    """Return the entry of a level's maps in unit.json."""
+    """Return the entry in unit.json of the maps of one level of detail."""
     height, width = (0, 0) if lod.normal_map is None else lod.normal_map.shape[:2]
     baked = lod.baked
     return {
@@ -286,7 +286,7 @@ def _arrays(lod: Lod) -> dict[str, Any]:
 
 
 def _share(stored: NDArray[np.uint8] | None) -> NDArray[np.float32] | None:
-    """Return 0..255 as 0..1; None for None."""
+    """Return stored values 0..255 as float32 0..1, or None if there are none."""
     return None if stored is None else np.divide(stored, 255, dtype=np.float32)
 
 

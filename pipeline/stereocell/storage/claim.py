@@ -30,7 +30,7 @@ class Claim:
     content: bytes
 
     def require(self) -> None:
-        """Raise OutputError if that command has ended."""
+        """Raise OutputError if the command has ended, so that OUT/.lock has changed or is gone."""
         with suppress(OSError):
             if self.file.read_bytes() == self.content:
                 return

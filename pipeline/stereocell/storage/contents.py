@@ -145,7 +145,8 @@ def _site(path: Path, names: set[str]) -> Contents | None:
 
 def _bundle(path: Path, names: set[str]) -> Contents | None:
     """Recognise a bundle, in a build or by itself."""
-    is_ours = {"files.json", "channels"} <= names or (  # the manifest may be missing
+    # A bundle whose manifest is missing is recognised by its other files.
+    is_ours = {"files.json", "channels"} <= names or (
         _MANIFEST in names and _read(path / _MANIFEST).get("format") == "stereocell-bundle"
     )
     if not is_ours:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from jsonschema import Draft202012Validator
 
 # Schemas by the name of a document: a file of schemas/, with `#Name` for one of its definitions.
-# A document without a schema only has to be JSON here; its reader has rules of its own.
+# A document whose schema is None is only checked to be JSON; its reader has rules of its own.
 SCHEMAS: dict[str, str | None] = {
     r"plan\.json": "plan.schema.json",
     r"provenance\.json": "units.schema.json#Provenance",

@@ -93,7 +93,7 @@ class FileStates:
         return sorted(path for path in differ if not self._is_rewritten(path))
 
     def _is_rewritten(self, path: str) -> bool:
-        """Return whether a file was written again with the same bytes."""
+        """Return whether a file has a new state, but the bytes that it had before."""
         known = self.digests.get(path)
         return known is not None and known == _digest(path)
 

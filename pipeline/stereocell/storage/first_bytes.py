@@ -79,7 +79,7 @@ _PATTERNS = (
     (rb"PK\x03\x04.{26}[^\x00]{1,80}\.npy", f"a NumPy archive of arrays ({_TO_TIFF}, one by one)"),
     (rb"PK\x03\x04", _ZIP),
     (
-        rb"<!doctype html>.{0,100}<title>StereoCell</title>",  # as bundle/blob_page.py begins it
+        rb"<!doctype html>.{0,100}<title>StereoCell</title>",  # written by bundle/blob_page.py
         SCENE,
     ),
 )

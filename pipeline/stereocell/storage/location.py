@@ -103,7 +103,7 @@ class Location:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The names along the path."""
+        """The names of the folders and the file along the path or address, without `/`."""
         path = self.shown.partition("://")[2]
         if self.is_local:
             file, inside = _split(self.source)

@@ -52,7 +52,7 @@ def alone_in(out: Path, command: str) -> Iterator[None]:
             if sys.platform == "win32":  # Windows can't remove an open file
                 os.close(file)
             with suppress(OSError):  # if OUT isn't writable, the next command takes the lock over
-                (out / LOCK).unlink(missing_ok=True)  # while held, so that nobody else gets it
+                (out / LOCK).unlink(missing_ok=True)  # before closing, so that nobody else holds it
             if sys.platform != "win32":
                 os.close(file)
     finally:
@@ -67,7 +67,7 @@ def _missing_folders(out: Path) -> list[Path]:
 
 
 def _hold(path: Path, command: str) -> tuple[int, bool]:
-    """Return the open lock, and whether its previous holder was killed."""
+    """Acquire the lock; return its open file, and whether its previous holder was killed."""
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -85,7 +85,7 @@ def _hold(path: Path, command: str) -> tuple[int, bool]:
                 break
         os.close(file)
     was_killed = os.fstat(file).st_size > 0
-    with suppress(OSError):  # on a full disk the content is missing, but it is only for people
+    with suppress(OSError):  # a full disk: the lock works without its content, which people read
         os.ftruncate(file, 0)
         os.write(file, json.dumps(describe(command)).encode())
     return file, was_killed

@@ -16,7 +16,7 @@ from stereocell.storage.object_lock import alone_at
 Size = int | None  # bytes of an object; None: it was removed
 
 _SMALL_BYTES = 1 << 16  # bytes of the largest object that counts as small
-# Files that list or describe other files. They are uploaded after those, in this order.
+# Files that list or describe other files. They are uploaded after all others, in this order.
 _LAST = (
     "tile.usdc",
     "contents.usda",
@@ -63,7 +63,7 @@ class Mirror:
         self.sizes: dict[str, int] | None = None
         self.news: dict[str, Size] = {}
         self.making: set[Path] = set()  # folders that this process will upload completely
-        self.moves: dict[str, str] = {}  # for keys in these folders, the key of the object to move
+        self.moves: dict[str, str] = {}  # new key in a folder of `making` -> key of object to move
         self._folders: dict[str, set[str]] = {}
         self._require_alone: Callable[[], None] = self._require_claim
 

@@ -109,7 +109,7 @@ def move(file: Path, to: Path) -> None:
     to.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(file, to)
-    except OSError:  # a file system without links
+    except OSError:  # the file system has no hard links
         os.replace(file, to)
 
 

@@ -23,7 +23,7 @@ FORMS = (
     "https://api.dandiarchive.org/api/assets/UUID/",
     "https://dandiarchive.org/dandiset/NUMBER/VERSION/files?location=PATH",
 )
-FILE_BYTES = 16 << 30  # bytes of the largest NIfTI file
+FILE_BYTES = 16 << 30  # bytes; a larger NIfTI file is refused
 _UUID = r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}"
 _OBJECT = re.compile(r"/(zarr|blobs)(/[\w-]+)+/?")
 _NUMBER, _VERSION = r"\d{6}", r"draft|\d+\.\d+\.\d+"
@@ -39,7 +39,7 @@ _HOSTS = (
 )
 _NIFTI = (".nii", ".nii.gz")
 _READ = (".zarr", *_NIFTI)
-_LISTED = 5  # assets that a message names
+_LISTED = 5  # assets that a message names at most
 
 
 def resolve(address: str) -> Resolved | None:
@@ -59,7 +59,7 @@ def resolve(address: str) -> Resolved | None:
 
 
 def _find_asset(client: WebClient, number: str, version: str, place: str) -> str:
-    """Return the UUID of the only readable asset at a place in a dandiset."""
+    """Return the UUID of the only readable asset at a path in a dandiset."""
     version = version or _newest(client, number)
     query = f"path={quote(place, safe='')}&page_size=1000"
     address = f"{API}/dandisets/{number}/versions/{version}/assets/?{query}"
@@ -70,7 +70,7 @@ def _find_asset(client: WebClient, number: str, version: str, place: str) -> str
     pairs = [
         (str(row.get("path")), str(row.get("asset_id"))) for row in rows if isinstance(row, dict)
     ]
-    # The archive matches the start of a path, even within a name.
+    # The archive also lists paths that only begin with these letters, such as `sub-10` for `sub-1`.
     own = [(p, key) for p, key in pairs if not place or p == place or p.startswith(f"{place}/")]
     found = [(path, key) for path, key in own if path.lower().endswith(_READ)]
     found = [(path, key) for path, key in found if path == place] or found

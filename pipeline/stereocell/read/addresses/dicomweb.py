@@ -23,10 +23,10 @@ from stereocell.storage.public_hosts import is_public, numbers_of, split_address
 
 TOKEN = "STEREOCELL_DICOMWEB_TOKEN"  # environment variable with the bearer token
 FORMS = ("https://HOST/.../studies/UID/series/UID", "https://HOST/.../studies/UID")
-SERIES_BYTES = 16 << 30  # bytes of the largest series
-MAX_INSTANCES = 100_000  # instances of one series
+SERIES_BYTES = 16 << 30  # bytes; a larger series is refused
+MAX_INSTANCES = 100_000  # instances; a series with more is refused
 UID = r"[0-9]+(?:\.[0-9]+)+"
-_LONGEST_UID = 64  # characters
+_LONGEST_UID = 64  # characters; a longer UID is refused
 _ADDRESS = re.compile(
     rf"(?P<root>https?://[^?#]+?)/studies/(?P<study>{UID})(?:/series/(?P<series>{UID}))?/?"
 )
@@ -146,7 +146,7 @@ def _first(row: Any, tag: str) -> Any:
 
 
 def _fetch(client: WebClient, address: str, folder: Path) -> int:
-    """Write the instances of a series to files named by numbers; return how many there are."""
+    """Write the instances of a series to files named by numbers, and return their number."""
     accept = 'multipart/related; type="application/dicom"; transfer-syntax=*'
     with client.opened(address, accept) as response:
         boundary = boundary_of(response.headers.get("Content-Type", ""), client.shown)
@@ -169,7 +169,7 @@ def _fetch(client: WebClient, address: str, folder: Path) -> int:
 def _write(
     path: Path, first: bytes | None, rest: Iterator[bytes | None], shown: str, *, limit: int
 ) -> int:
-    """Write the pieces of one part up to None; return its number of bytes."""
+    """Write one part of an answer, whose pieces end with None, to a file; return its bytes."""
     size, piece = 0, first
     with open(path, "xb") as file:
         while piece is not None:

@@ -22,7 +22,7 @@ _LOCK = ".lock"
 
 
 def new_folder(name: str) -> Path:
-    """Return a new, empty folder with this name, which is removed when this process ends."""
+    """Create an empty folder with this name and return it. It is removed when this process ends."""
     _remove_abandoned()
     outer = Path(tempfile.mkdtemp(prefix=_PREFIX))
     atexit.register(_remove, outer, os.getpid())
@@ -47,10 +47,10 @@ def _hold(outer: Path) -> None:
     if sys.platform == "win32":
         return
     part = outer / f"{_LOCK}.part"
-    # stays open until the process ends
+    # the file stays open, and so locked, until the process ends
     file = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
     fcntl.flock(file, fcntl.LOCK_EX)
-    # renamed only once it is locked, because others take an unlocked file for abandoned
+    # Renamed only once it is locked: other commands remove a folder whose lock file isn't locked.
     part.rename(outer / _LOCK)
 
 

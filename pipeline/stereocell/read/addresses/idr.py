@@ -26,7 +26,8 @@ FORMS = (
 )
 _SAMPLES = "https://idr.github.io/ome-ngff-samples/"
 _HOST = "idr.openmicroscopy.org"
-_VERSIONS = ("v0.5", "v0.4", "v0.3", "v0.2", "v0.1")  # in the order of the search
+# versions of OME-Zarr in the order in which they are searched for
+_VERSIONS = ("v0.5", "v0.4", "v0.3", "v0.2", "v0.1")
 _STUDY = re.compile(r"(idr\d{4})\b.*?(?:/(?:experiment|screen)([A-Z]))?")
 _ID = r"[1-9]\d{0,11}"
 

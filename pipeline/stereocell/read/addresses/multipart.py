@@ -33,12 +33,12 @@ def split_parts(blocks: Iterator[bytes], boundary: bytes, shown: str) -> Iterato
     """
     delimiter = b"\r\n--" + boundary
     held = _Held(blocks, shown)
-    held.bytes += b"\r\n"  # the first delimiter may be at the very beginning
+    held.bytes += b"\r\n"  # a delimiter starts with a line break, which the first one may lack
     for _ in held.until(delimiter):
-        pass  # a preamble has no meaning
+        pass  # text before the first delimiter has no meaning
     while not held.starts_with(b"--"):
         skipped = 0
-        for piece in held.until(b"\r\n"):  # spaces after a boundary
+        for piece in held.until(b"\r\n"):  # the delimiter's line may end with spaces
             skipped += len(piece)
             _require_short(skipped, shown)
         if held.starts_with(b"\r\n"):
@@ -64,7 +64,7 @@ class _Held:
         self.bytes = bytearray()
 
     def starts_with(self, mark: bytes) -> bool:
-        """Return whether the next bytes are these."""
+        """Return whether the next bytes are those of `mark`. They stay in the buffer."""
         while len(self.bytes) < len(mark):
             self._fill()
         return self.bytes.startswith(mark)

@@ -1,7 +1,7 @@
 """Find the data behind an address that a person has copied from a browser.
 
-It is called where a person enters an address, before `read.open`. A plan stores what it returns, so
-no worker asks a service again, and no file written by a stranger triggers requests.
+`resolve` is called where a person enters an address, before `read.open`. A plan stores its result,
+so no worker asks a service again, and no file written by a stranger triggers requests.
 """
 
 from collections.abc import Callable
@@ -46,7 +46,7 @@ def resolve(source: str | Path) -> Resolved:
 
 
 def remember(source: str | Path, found: Resolved) -> None:
-    """Store what another process of the same command has resolved."""
+    """Store a result of `resolve` that another process of the same command has found."""
     _known[Location.of(source).source] = found
 
 

@@ -22,7 +22,7 @@ from stereocell.storage.public_hosts import (
 )
 
 ANSWER_BYTES = 16 << 20  # bytes of the largest answer in JSON or XML
-ANSWER_S = 60.0  # s for such an answer, from its first byte to its last
+ANSWER_S = 60.0  # s for an answer in JSON or XML, from its first byte to its last
 _REDIRECTS = 5
 _BLOCK_BYTES = 1 << 18
 _MOVED = (301, 302, 303, 307, 308)
@@ -32,7 +32,7 @@ _NO_LOGIN = "expected data that are open to all"
 class WebClient:
     """Asks the hosts of one service, and follows redirects to public hosts.
 
-    own    addresses of the service, or of the user: their origins may be private
+    own    addresses of the service, or of the user: only their hosts may have private IP addresses
     token  secret for the first of these origins; no other host gets it, not even by a redirect
     login  remedy where a host requires a login
     shown  name of the service for messages; it contains no secret and no identity
@@ -78,7 +78,7 @@ class WebClient:
             raise wrong_answer(self.shown, "damaged JSON", "JSON") from None
 
     def is_there(self, address: str) -> bool:
-        """Return whether a file lies at an address. For none, a public bucket may answer 403."""
+        """Return whether a file lies at an address. HTTP 401 and 403 count as missing."""
         try:
             with self.opened(address, "*/*", refused=NotThereError):
                 return True
@@ -149,7 +149,7 @@ class WebClient:
         scheme, host, port = origin = origin_of(address)
         numbers = numbers_of(address) if origin in self._own else public_numbers_of(address)
         with self._one_line():
-            # Connect to the checked IP addresses: a name could resolve to others a moment later.
+            # Connect to the checked IP addresses: the name may lead to other ones a moment later.
             opened = _connected(numbers, port)
             connection: http.client.HTTPConnection
             if scheme == "http":

@@ -1,4 +1,7 @@
-"""Count the blocks of BigDataViewer's views that are not stored in the container."""
+"""Count the blocks that a BigDataViewer container does not store.
+
+Here a view is one setup at one time point, an array of its own.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +16,7 @@ def count_in_views(
     states: FileStates,
     count: Callable[[Any, Spans, FileStates], Absent | None],
 ) -> Absent | None:
-    """Return how many blocks of BigDataViewer's views are absent; each view is an array of its own.
+    """Return how many blocks of the views in `spans` are absent; None: they can't be counted.
 
     count  function that counts the absent blocks of one view
     """

@@ -23,7 +23,7 @@ _CHANNEL = "channel"
 _OTHER_SCALE = 0.05  # relative difference in scale; chromatic aberration stays below 0.01
 # cosine of the largest angle between the same axis of two channels
 _OTHER_DIRECTION = math.cos(math.radians(45))
-_SHOWN = 8  # numbers that a message shows
+_SHOWN = 8  # missing time points or setups that a message lists at most
 
 Matrix = NDArray[np.float64]  # (4, 4), for column vectors: from voxels (x, y, z, 1) to the world
 
@@ -31,7 +31,7 @@ Matrix = NDArray[np.float64]  # (4, 4), for column vectors: from voxels (x, y, z
 def have_one_grid(first: Matrix, other: Matrix) -> bool:
     """Return whether two registrations agree in scale and direction; their shifts may differ."""
     if not (np.isfinite(first).all() and np.isfinite(other).all()):
-        return True  # the reader reports unreadable registrations
+        return True  # unreadable registrations count as equal; the reader reports them
     relative = np.linalg.pinv(first[:3, :3]) @ other[:3, :3]
     lengths = np.linalg.norm(relative, axis=0)
     return bool(
@@ -45,7 +45,7 @@ class Setup:
     """One channel of a view.
 
     spacing_um  (z, y, x); None: not stated in a unit of length
-    unit_um     unit of the voxel size, um; None: it is not a unit of length
+    unit_um     length of the voxel size's unit in um; None: it is not a unit of length
     size        voxels (x, y, z); None: not stated
     attributes  numbers by attribute name: tile, channel and others, also the user's own
     """

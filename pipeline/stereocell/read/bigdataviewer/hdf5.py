@@ -27,7 +27,7 @@ _MAX_LEVELS = 64
 
 
 class _Cells:
-    """The voxels of a view; int16 is read as the uint16 that it really holds."""
+    """The voxels of one setup at one time point; int16 is read as the uint16 that it holds."""
 
     def __init__(self, array: Hdf5Array) -> None:
         self.shape, self.chunks = array.shape, array.chunks
@@ -43,7 +43,7 @@ class _Cells:
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
         found = np.asarray(self._array[key])
-        return found.astype(self.dtype, copy=False)  # conversion from int16 is modulo 2^16
+        return found.astype(self.dtype, copy=False)  # int16 -1 becomes uint16 65535
 
 
 def is_container(tree: Hdf5Tree) -> bool:

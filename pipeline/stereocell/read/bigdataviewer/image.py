@@ -14,7 +14,7 @@ from stereocell.read.series import choose
 from stereocell.read.spacing import Grid, Triple
 from stereocell.read.statements import Statement, Subject, Trust, omission, settle
 
-# The views of one level, by time point and setup, each (z, y, x). None: the view is missing.
+# Arrays (z, y, x) of one level, by time point and setup: BigDataViewer's views. None: missing.
 Views = Sequence[Sequence[StoredArray | None]]
 _REMEDY = "--spacing-um z,y,x replaces it"
 _NO_XML = "BigDataViewer states it in an XML, which is not beside the container"
@@ -22,7 +22,7 @@ _TOLERANCE = 5e-3  # relative difference of two spacings that needs no note
 
 
 class BdvLevel:
-    """The views of one level as (t, c, z, y, x)."""
+    """The arrays of one level, one for each time point and setup, as (t, c, z, y, x)."""
 
     def __init__(self, views: Views) -> None:
         first = next(_present(views))
@@ -32,7 +32,7 @@ class BdvLevel:
         self._views = views
 
     def view(self, time: int, channel: int) -> StoredArray:
-        """Return the array of one view, (z, y, x)."""
+        """Return the array (z, y, x) of one time point and channel."""
         found = self._views[time][channel]
         assert found is not None, "channels without a view at this time are left out beforehand"
         return found

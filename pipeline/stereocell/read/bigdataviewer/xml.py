@@ -18,10 +18,11 @@ from stereocell.read.spacing import Triple, um_per
 from stereocell.read.stated_numbers import numbers_of
 from stereocell.storage.location import is_own
 
-_MAX_FILES = 50  # XML files of a folder that are looked into
+_MAX_FILES = 50  # XML files of a folder that are looked into at most
 _MAX_BYTES = 16 << 20
 _MAX_TIMES = 100_000
-_RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?(?::(\d{1,9}))?")  # first-last:step
+# Numbers of time points: `first`, `first-last` or `first-last:step`.
+_RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?(?::(\d{1,9}))?")
 
 
 def read_described(path: str, xml: str = "") -> Described:

@@ -78,7 +78,7 @@ def _container_of(location: Location) -> Location:
             f"{location.folder} (links are followed)"
         )
     if not os.path.isdir(path):
-        require_own(path, [location.folder], named=field)  # opening a pipe would block
+        require_own(path, [location.folder], named=field)  # refuses a pipe, which would block
     container = Location.of(path)
     format = format_of(path)
     if os.path.isdir(path) and format.name == "ome-zarr":

@@ -22,8 +22,8 @@ from stereocell.storage.first_bytes import Mark
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_USUAL = {3: ("z", "y", "x"), 4: ("c", "z", "y", "x")}  # usual axes by their number
-_REFUSED = {"O": "Python objects", "V": "records", "b": "bool, a mask"}  # by the dtype's kind
+_USUAL = {3: ("z", "y", "x"), 4: ("c", "z", "y", "x")}  # usual axes by the number of dimensions
+_REFUSED = {"O": "Python objects", "V": "records", "b": "bool, a mask"}  # words by dtype.kind
 
 
 def _open(location: Location, *, axes: str = "") -> Image:

@@ -28,10 +28,10 @@ from stereocell.read.hdf5_file.windows import PluginWindows, has_plugins
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
 
-_MAX_STEPS = 200  # names along a path, including followed links
-_MAX_NODES = 20_000  # groups and datasets that a search visits
-_LISTED = 12  # names that a message lists
-_NUMBERS = "biuf"  # kinds of dtype that are numbers
+_MAX_STEPS = 200  # names along a path, including followed links; a longer path is refused
+_MAX_NODES = 20_000  # groups and datasets that a search visits at most
+_LISTED = 12  # names that a message lists at most
+_NUMBERS = "biuf"  # values of dtype.kind for numbers
 # HDF5's message for a truncated file
 _CUT = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
 _FIRST_PLUGIN = 256  # filter number; HDF5's own filters have smaller ones

@@ -26,9 +26,9 @@ from stereocell.read.tables.table import (
 )
 from stereocell.storage.location import Location
 
-_MAX_BYTES = 4 << 30  # bytes of a table
-_LONGEST = 1 << 17  # characters of a cell: the csv module's own limit
-_LONGEST_LINE = 1 << 24  # characters of a line
+_MAX_BYTES = 4 << 30  # bytes; a larger table is refused
+_LONGEST = 1 << 17  # characters of the longest cell that the csv module accepts
+_LONGEST_LINE = 1 << 24  # characters; a line with as many or more is refused
 _BLOCK = 1 << 20  # bytes read at a time
 _UTF16 = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 # bytes of Windows-1252 in units and European names: ° ± ² ³ µ · and all letters except þ and ÿ

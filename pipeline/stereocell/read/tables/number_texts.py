@@ -22,8 +22,8 @@ from stereocell.read.tables.table import MISSING, TableColumn, word_of
 POINT, COMMA = ".", ","
 _SEMICOLON = ";"  # separates cells in tables with a decimal comma
 _MOST_WORDS = 5  # different words that may stand among numbers; error values don't count
-_MOST_SHARE = 0.25  # share of the filled cells that may be such words
-# the same share if some numbers have fractions, since categories have none
+_MOST_SHARE = 0.25  # share of the filled cells that may be words in a column of numbers
+# that share for a column in which some numbers have fractions, since codes of categories have none
 _MOST_SHARE_OF_FRACTIONS = 0.5
 _MIXED = 0.25  # share of numbers in a column of texts above which a note counts them
 _SHOWN = 4  # words or columns that a note lists

@@ -36,7 +36,7 @@ from stereocell.storage.location import Location
 _EXPECTED = "a complete Parquet file"
 _BATCH = 1 << 16  # rows read at a time
 _MOST_S = 600.0  # s; time limit for a table. 10 million rows take less than a tenth of it
-_MAX_BYTES = 1 << 28  # bytes of a column in a group of rows
+_MAX_BYTES = 1 << 28  # bytes; a table with a larger column in a group of rows is refused
 _INDEX = "__index_level_"  # pandas' name for an index without a name
 
 

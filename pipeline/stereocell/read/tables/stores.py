@@ -32,8 +32,8 @@ from stereocell.storage.location import Location
 _EXPECTED = "a table of AnnData (obs, var, X)"
 _MOST_S = 300.0  # s; time limit for a table in HDF5. A million rows take less than a tenth of it
 _TEXT_BYTES = 1024  # bytes of a text, on average within its chunk
-_LARGEST_CHUNK = 1 << 28  # bytes
-_LONGEST_TEXT = 4096  # bytes of a fixed-length text
+_LARGEST_CHUNK = 1 << 28  # bytes; an array with larger chunks is refused
+_LONGEST_TEXT = 4096  # bytes; an array of longer fixed-length texts is refused
 
 
 def read_anndata_zarr(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:

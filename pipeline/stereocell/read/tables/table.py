@@ -12,11 +12,11 @@ from stereocell.model.errors import SourceError
 
 # Names of the column of objects' numbers in MCMICRO, scikit-image, Cellpose, Xenium, SpatialData
 KEYS = ("CellID", "label", "cell_id", "instance_id", "object_id", "ObjectNumber", "id")
-MAX_COLUMNS = 128  # columns that are read if the user names none
-MAX_NAMES = 100_000  # columns that a file may have
+MAX_COLUMNS = 128  # columns that are read at most if the user names none
+MAX_NAMES = 100_000  # columns; a file with more is refused
 MAX_ROWS = 1 << 24
-_LONGEST = 200  # characters of a category
-_SHOWN = 8  # names that a message lists
+_LONGEST = 200  # characters; a longer category is cut
+_SHOWN = 8  # names that a message lists at most
 # words for a missing value, in lower case, as in pandas
 MISSING = (
     *("", "na", "nan", "n/a", "null", "none", "<na>", "-nan"),

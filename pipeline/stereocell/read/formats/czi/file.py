@@ -11,8 +11,8 @@ from stereocell.model.errors import SourceError
 from stereocell.read.formats.czi.tiles import SEGMENT, CziTiles
 from stereocell.storage.library_errors import one_line
 
-_PLACES = struct.Struct("<2q")  # places of the directory of voxels and of the metadata
-_PLACES_AT = 84  # bytes from the start of the file
+_PLACES = struct.Struct("<2q")  # byte offsets of the directory of tiles and of the metadata
+_PLACES_AT = 84  # byte offset of these two numbers in the file
 Rectangle = tuple[int, int, int, int]  # x, y, width, height
 
 
@@ -70,7 +70,7 @@ class CziFile:
 
 
 def _require_whole(path: str, where: str) -> int:
-    """Return the byte at which the directory begins.
+    """Return the byte at which the directory of tiles begins.
 
     Raises SourceError where the file ends before the directory or the metadata, which most writers
     write last.

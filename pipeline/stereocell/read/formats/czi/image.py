@@ -40,7 +40,7 @@ _UM_PER_METER = 1e6
 _ABSENT = "read as 0, which the format uses for tiles that were not acquired; they may be lost"
 _INTERVAL = "Metadata/Information/Image/Dimensions/Z/Positions/Interval/Increment"
 _DEPTH = Subject("voxel spacing along z", "um", 0.01, "--spacing-um z,y,x replaces it")
-_MAX_DIGITS = 10  # digits of a size in the metadata
+_MAX_DIGITS = 10  # digits; a size with as many or more in the metadata counts as not stated
 
 
 class _File:

@@ -56,7 +56,7 @@ class _Entry:
 class CziTiles:
     """The entries of a directory, by plane. The tiles of a plane are compared once.
 
-    at  place of the directory in the file
+    at  byte at which the directory begins in the file
 
     `counts` has the number of tiles of the finest level, by scene and plane (c, t, z); it is empty
     for an early file.

@@ -18,7 +18,7 @@ from stereocell.model.counted import agreeing, counted
 from stereocell.read.formats.dicom.frame import Frame
 from stereocell.read.formats.dicom.split_kinds import find_runs
 
-_LEAST_SLICES = 3  # slices of a bed position
+_LEAST_SLICES = 3  # fewest slices of a bed position
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,14 +70,14 @@ def _padding(header: Any) -> tuple[int, int] | None:
     ends = []
     for key in ("PixelPaddingValue", "PixelPaddingRangeLimit"):
         value = header.get(key)
-        if isinstance(value, bytes) and len(value) == 2:  # bytes, because the VR is unknown
+        if isinstance(value, bytes) and len(value) == 2:  # pydicom returns bytes for an unknown VR
             little = header.original_encoding[1]
             value = int.from_bytes(value, "little" if little else "big")
         if isinstance(value, int):
             ends.append(value)
         elif not ends:
             return None
-    if header.get("PixelRepresentation"):  # the VR may have given another sign
+    if header.get("PixelRepresentation"):  # pixels are signed; the VR may have stated otherwise
         ends = [((end + 0x8000) & 0xFFFF) - 0x8000 for end in ends]
     else:
         ends = [end & 0xFFFF for end in ends]

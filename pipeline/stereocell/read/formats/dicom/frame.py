@@ -72,7 +72,7 @@ class Frame:
     kind               magnitude, projection, echo and so on; empty for a segmentation
     stated             values that repeat the geometry
     scale              statements on the values
-    origin             study and series, beside their UIDs
+    origin             digest of the study and of the series' number and descriptions
     start              byte of the file at which its values begin, little-endian, row by row; None:
                        they must be decoded, or are a part of an image
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from stereocell.read.formats.dicom.frame import Frame, Vector
 
 PARALLEL = 2e-3  # rad; planes that differ more in orientation belong to different stacks
-ALIKE = 1e-3  # share of the pixel spacing: half a pixel over 512 pixels
+ALIKE = 1e-3  # share of the pixel spacing by which two may differ: half a pixel over 512 pixels
 _SAME_WAY = np.cos(np.radians(5.0))  # cosine; stacks whose normals are closer can interleave
 
 # attributes that separate stacks: field of Frame, name in the standard
@@ -36,13 +36,13 @@ class Group:
 
     def __init__(self, first: Frame) -> None:
         self.frames = [first]
-        self.words: tuple[str, ...] = ()  # properties that separate it from other groups, in words
-        self.order: tuple[int, ...] = ()  # key that sorts it among those groups
+        self.words: tuple[str, ...] = ()  # words for its difference from other groups of the series
+        self.order: tuple[int, ...] = ()  # key that sorts it among the groups of the series
         self.notes: tuple[str, ...] = ()
         self.unjoined = ""  # why slices with different UIDs were not joined to one stack
         self._directions = _directions(first)
         self._spacing = np.array(first.spacing)
-        # all frames state the same values, so no mean, which rounds, is needed
+        # True while all frames state the same values, so that no mean, which rounds, is needed
         self._is_exact = True
 
     def takes(self, frame: Frame) -> bool:
@@ -130,7 +130,7 @@ class Group:
         """Return lowest and highest position (2, 3), mm along the axes (3, 3), one per row."""
         first = self.frames[0]
         size = np.array(self.spacing) * (first.rows, first.columns)
-        corner = _directions(first)[::-1] * size[:, None]  # down the rows, then along them
+        corner = _directions(first)[::-1] * size[:, None]  # mm: a plane's column, then its row
         positions = np.array([frame.position for frame in self.frames])
         places = np.concatenate([positions, positions + corner.sum(axis=0)]) @ axes.T
         return np.stack([places.min(axis=0), places.max(axis=0)])
@@ -161,7 +161,10 @@ def _directions(frame: Frame) -> NDArray[np.float64]:
 
 
 def _turns(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
-    """Return whether directions (2, 3) differ by more than rounding; chord = angle (rad)."""
+    """Return whether unit vectors (2, 3) differ by more than rounding.
+
+    The distance between two unit vectors is nearly the angle between them in rad.
+    """
     return bool(np.linalg.norm(a - b, axis=1).max() > PARALLEL)
 
 

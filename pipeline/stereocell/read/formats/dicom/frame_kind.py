@@ -40,8 +40,8 @@ _COMPONENTS = {
     **dict.fromkeys(("R", "REAL"), REAL),
     **dict.fromkeys(("I", "IMAGINARY"), IMAGINARY),
 }
-_PHILIPS = re.compile(r"([MPRI])_[A-Z0-9]+")  # such as `M_FFE`, `R_IR`
-_GE = (MAGNITUDE, PHASE, REAL, IMAGINARY)  # by the number in GE's private element
+_PHILIPS = re.compile(r"([MPRI])_[A-Z0-9]+")  # Philips's words, such as `M_FFE` or `R_IR`
+_GE = (MAGNITUDE, PHASE, REAL, IMAGINARY)  # indexed by the number in GE's private element
 # role -> rank: an image (0) is shown first, a screen save last
 _RANKS = {
     "": 0,

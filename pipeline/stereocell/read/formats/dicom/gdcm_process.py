@@ -12,7 +12,7 @@ from stereocell.storage.child_process import Child, ChildError
 
 
 class GdcmProcess:
-    """Decodes files with GDCM. The first file starts the process; leaving the block ends it."""
+    """Decodes files with GDCM. The first file starts the process; leaving `with` ends it."""
 
     def __init__(self) -> None:
         self._child: Child | None = None

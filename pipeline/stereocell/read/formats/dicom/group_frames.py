@@ -13,7 +13,7 @@ from stereocell.read.plane_stack import SAME_PLACE
 
 
 def find_groups(frames: Iterable[Frame]) -> list[Group]:
-    """Return the frames by stack."""
+    """Return a group of frames for each stack."""
     groups: dict[tuple[object, ...], list[Group]] = {}
     for frame in frames:
         alike = groups.setdefault(key_of(frame), [])

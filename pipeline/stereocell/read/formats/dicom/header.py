@@ -92,11 +92,11 @@ _NAMED: list[Any] = [
 ]
 # converted once, because pydicom would look them up for each file
 _TAGS = [Tag(name) for name in _NAMED]
-SEGMENTATION = "holding a segmentation"  # first words of a reason
+SEGMENTATION = "holding a segmentation"  # first words of the reason for leaving out such a file
 _NO_PLACE = "without a place in the patient"
 _NO_SPACING = "without a PixelSpacing above 0"
 _UNDEFINED = 0xFFFFFFFF  # length of an element that ends with a delimiter
-_LONG_VRS = (b"OB", b"OW", b"OF", b"OD", b"UN")  # their length has four bytes
+_LONG_VRS = (b"OB", b"OW", b"OF", b"OD", b"UN")  # VRs whose elements state a length of four bytes
 # attributes that pydicom needs to decode pixels
 _ASKED = (
     "Rows",
@@ -208,7 +208,7 @@ def _frames(
         raise NoPlaneError(f"without pixels{_kind(header)}")
     grey = ["MONOCHROME1", "MONOCHROME2"]
     if segmentation is not None and segmentation.kind == LABELMAP:
-        grey.append("PALETTE COLOR")  # the palette colours numbers
+        grey.append("PALETTE COLOR")  # the palette gives colours to object numbers
     colours = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
     if int(header.get("SamplesPerPixel") or 1) != 1 or colours not in grey:
         raise NoPlaneError(f"in colour, not in grey values{_kind(header)}")
@@ -226,7 +226,7 @@ def _frames(
         hashlib.sha256(str(header.get(key, "")).encode()).digest() for key in uids
     )
     parts = int(header.get("InConcatenationTotalNumber") or 0)
-    if "SOPInstanceUID" not in header:  # then nothing identifies copies
+    if "SOPInstanceUID" not in header:  # the file's number stands for it, so no copies are found
         instance = f"{file.number}".encode()
     modality = str(header.get("Modality", "")).strip()
     is_quadruped = str(header.get("AnatomicalOrientationType", "")).strip() == "QUADRUPED"

@@ -48,7 +48,7 @@ from stereocell.read.whole_array import WholeArray
 from stereocell.storage.location import Location, first_bytes, is_own
 
 _INSTEAD = "expected the image that it was drawn on"
-_MOST_KINDS = 4  # kinds of images that notes name
+_MOST_KINDS = 4  # kinds of images that a note names at most
 _COPIES = "copies of others"
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
@@ -81,7 +81,8 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         )
     stack = found.stacks[max(series, 1) - 1]
     if (segmentation := stack.first.segmentation) is not None:
-        if not series or segmentation.kind == LABELMAP:  # numbers of objects have no mean
+        # A LABELMAP's pixels are object numbers, which can't be averaged like one segment's mask.
+        if not series or segmentation.kind == LABELMAP:
             return _label_map(found, stack, series, location.shown)
         if stack.layout is None:
             raise _no_labels(stack, len(found.stacks), location.shown, stack.problem)
@@ -245,7 +246,7 @@ def _find(location: Location) -> Found:
             remedies.append(error.remedy)
     compare = partial(_are_equal, paths, location.shown)
     twice = set()
-    # the same image stored twice; with other pixels it is another image
+    # Images with one UID are copies if their positions and pixels are equal, else separate images.
     for earlier, frame in copies:
         if earlier.position == frame.position and compare(earlier, frame):
             twice.add(frame.file)

@@ -91,7 +91,7 @@ def _series_key(group: Group) -> object:
     first = group.frames[0]
     if first.segmentation is not None:
         return id(group)
-    # The fields left out here count images and times, and may change along a volume.
+    # The fields that are set to None count images and times, and may change along a volume.
     kinds = frozenset(
         replace(frame.kind, acquisition=None, trigger_time=None, reference_time=None,
                 time_slice=None)

@@ -16,7 +16,7 @@ _KERNEL = re.compile(
     r"|STANDARD|SOFT|DETAIL|CHEST|LUNG|BONE(PLUS)?|EDGE|ULTRA"
 )
 _STRENGTH = re.compile(r"Q?\d")  # strength of the iterative reconstruction, beside the kernel
-_SHARP = re.compile(r"DETAIL|CHEST|LUNG|BONE(PLUS)?|EDGE|ULTRA")  # GE's kernels that sharpen edges
+_SHARP = re.compile(r"DETAIL|CHEST|LUNG|BONE(PLUS)?|EDGE|ULTRA")  # GE's edge-sharpening kernels
 
 
 def kernel_of(frame: Frame) -> tuple[bool, tuple[str, ...]]:

@@ -78,7 +78,7 @@ class LabelStack:
         volume = np.zeros(self.shape, self.dtype)
         for plane, frame, pixels in self._decoded(numbers, paths, shown):
             if self.segmentation.kind == LABELMAP:
-                low, high = frame.encoding.padding or (0, 0)  # padding is the background's number
+                low, high = frame.encoding.padding or (0, 0)  # numbers of the background
                 volume[plane] = np.where((pixels >= low) & (pixels <= high), 0, pixels)
             elif not _draw(volume[plane], pixels, frame.segment):
                 raise SourceError(
@@ -152,7 +152,7 @@ def _planes(heights_mm: NDArray[np.float64], stated_mm: float) -> tuple[list[int
         exact = heights_mm / step
         planes = np.rint(exact)
         last = float(planes.max())
-        if last:  # a stated spacing may be rounded, which adds up
+        if last:  # the rounding of a stated spacing would add up from plane to plane
             step = float(heights_mm.max()) / last
             exact = heights_mm / step
             planes = np.rint(exact)

@@ -78,7 +78,7 @@ def _read(header: Any, item: Any) -> ModalityTable:
         first -= 1 << 16
     data = item.LUTData
     if isinstance(data, bytes) and depth <= 8 and len(data) in (count, count + 1):
-        values = np.frombuffer(data, np.uint8)[:count].astype(np.uint16)  # two entries per word
+        values = np.frombuffer(data, np.uint8)[:count].astype(np.uint16)  # one byte per entry
     else:
         values = np.asarray(_words(data, little), np.int64).astype(np.uint16)
     if len(values) != count or not 1 <= depth <= 16 or int(values.max()) >= 1 << depth:

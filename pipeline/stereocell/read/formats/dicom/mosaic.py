@@ -32,8 +32,8 @@ _SIEMENS_TAGS: list[Any] = [
     *(0x00290010 + (block << 8) for block in (0x10, 0x11, 0x12)),
 ]
 _UIH_SLICES = 0x00651051
-_MAX_SLICES = 4096  # slices of one image
-_MAX_COSINE_ERROR = 0.01  # difference of the cosine between stated and computed normal from 1
+_MAX_SLICES = 4096  # slices; a mosaic that states more is left out
+_MAX_COSINE_ERROR = 0.01  # largest difference from 1 of the cosine of stated and computed normal
 
 
 class MosaicError(Exception):

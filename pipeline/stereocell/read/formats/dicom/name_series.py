@@ -21,7 +21,7 @@ _MOST_NAMED = 3  # properties that are added to a name
 def name_apart(stacks: Sequence[Stack]) -> list[Stack]:
     """Return the stacks; several series of the same size are named by their differences.
 
-    The index of each value among those of the other series is added to `among`.
+    `Stack.among`, by which series of equal size are sorted, gets the index of each such value.
     """
     families: dict[tuple[Any, ...], list[int]] = defaultdict(list)
     for index, stack in enumerate(stacks):

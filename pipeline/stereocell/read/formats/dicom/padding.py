@@ -36,7 +36,7 @@ def is_padding(
         return None
     low, high = encoding.padding
     least, most = encoding.stored_range
-    if low < least or high > most:  # only the whole container can hold such a value
+    if low < least or high > most:  # only all bits of the container can hold this padding
         mask = (contained >= low) & (contained <= high)
     elif encoding.is_inverted:
         mask = (stored >= least + most - high) & (stored <= least + most - low)

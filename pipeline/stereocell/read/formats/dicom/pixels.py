@@ -18,7 +18,7 @@ from stereocell.read.formats.dicom.stored_values import open_pixels, stored_valu
 from stereocell.read.rescale import dtype_for, rescale
 from stereocell.storage.library_errors import raise_if_short
 
-_HALF = 16  # bits; values with at most so many are unpacked in 32
+_HALF = 16  # bits; values in containers of at most this size are unpacked to int32, others to int64
 
 
 def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:

@@ -77,7 +77,7 @@ _ROLES = {
     "slices",
     "rendering": "a rendering is only a view of a volume: name the folder of the slices",
 }
-# start of a reason -> remedy
+# start of the reason for leaving a file out -> remedy
 _REASONS = (
     (
         "in colour",

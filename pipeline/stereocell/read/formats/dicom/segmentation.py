@@ -32,8 +32,8 @@ _CLASSES = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")
 class Segmentation:
     """One file's segments.
 
-    kind        BINARY: a frame has the bits of one segment; FRACTIONAL: its shares; LABELMAP: a
-                pixel is a segment's number
+    kind        BINARY: a frame has one bit per pixel for one segment; FRACTIONAL: a fraction per
+                pixel; LABELMAP: a pixel is a segment's number
     overlap     whether segments overlap: YES or NO; other words leave it open
     count       number of segments, without the background
     between_mm  mm from plane to plane, as stated; 0: not stated

@@ -38,7 +38,7 @@ from stereocell.read.plane_stack import (
 )
 
 _LAST = 6  # rank of a stack that lacks slices of a time point
-# from this rank on, a series is not an image and follows the others regardless of its size
+# Rank from which a series holds no images of anatomy. It follows all images, however large it is.
 _SIDE = 2
 
 

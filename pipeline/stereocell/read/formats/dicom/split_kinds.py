@@ -23,10 +23,10 @@ from stereocell.read.formats.dicom.kernel_names import kernel_of, kernel_words
 from stereocell.read.formats.dicom.pet_kind import NOT_CORRECTED
 from stereocell.read.formats.dicom.type_names import type_of, type_words
 
-_SHARED = 0.5  # smallest share of the fewer slices that must compete
+_SHARED = 0.5  # share of the smaller set's slices that must compete or alternate, at least
 _MIN_WOVEN = 3  # fewest slices of a volume between the slices of another one
 _GAPS = 1.5  # an interleaved acquisition's own slices are at least this many slice distances apart
-_FILLS = 1.25  # and at most this many slice distances thick
+_FILLS = 1.25  # slices of an interleaved acquisition are at most this many slice distances thick
 _MAX_VALUES = 256  # values of a property; with more, it doesn't separate volumes
 _MAX_RUNS = 8  # runs of instance numbers; with more, the numbers have no order
 _NUMBER_MOST = 9999  # larger acquisition numbers are not shown, because they may be dates

@@ -134,7 +134,7 @@ def _directions(header: Any) -> tuple[str, ...]:
     if len(words) != 2 or not all(_DIRECTION.fullmatch(word) for word in words):
         return ()
     axes = {next(axis for axis in ("LR", "AP", "HF") if word[0] in axis) for word in words}
-    return words if len(axes) == 2 else ()  # a row and a column can't lead the same way
+    return words if len(axes) == 2 else ()  # rows and columns along one axis are an error
 
 
 def _volumes(header: Any) -> tuple[float, str] | None:

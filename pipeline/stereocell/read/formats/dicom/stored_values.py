@@ -161,7 +161,7 @@ def plane_size(stream: bytes) -> tuple[int, int] | None:
         if stream[place] != 0xFF:
             return None
         code = stream[place + 1]
-        if code == 0xFF:  # a fill byte
+        if code == 0xFF:  # fill bytes may precede a marker
             place += 1
             continue
         if code in _FRAMES:

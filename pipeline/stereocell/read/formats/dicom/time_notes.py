@@ -63,7 +63,7 @@ def _renumbered(points: Points) -> list[str]:
     images = len(points.whole) + len(points.incomplete)
     keys, first = tuple(map(float, range(images))), 0.0
     if points.attribute == BY_POSITION and points.values[-1] <= _MOST_SHOWN:
-        keys, first = points.values, min(points.values[0], 1.0)  # the standard counts from 1
+        keys, first = points.values, min(points.values[0], 1.0)  # DICOM counts time points from 1
     moved = [
         f"--time {time} is {point_name(points, place)}"
         for time, place in enumerate(points.whole_places)

@@ -18,8 +18,8 @@ from stereocell.read.formats.dicom.stack import Stack
 _OFFSET_HU = -500.0  # intercepts of a scanner's offset are at most this
 _FAR_HU = -1500.0  # half-way between air (-1000) and air with the offset applied twice
 _FAR_SHARE = 0.05  # smallest share of the voxels below _FAR_HU
-_VARIED = 0.01  # smallest share of these that differ from their minimum
-_TISSUE_HU = -300.0  # fat and denser tissue is above; rescaled twice, only dense bone is
+_VARIED = 0.01  # smallest share of the voxels below _FAR_HU that differ from their minimum
+_TISSUE_HU = -300.0  # fat and denser tissue lies above it; rescaled twice, only dense bone does
 _TISSUE_SHARE = 0.05  # largest share of the voxels above _TISSUE_HU
 _LOW_HU = -1024.0  # lowest value that most scanners store
 LEVEL_HU, WINDOW_HU = -300.0, (-1024.0, 2000.0)  # iso-value and window of preset `ct`

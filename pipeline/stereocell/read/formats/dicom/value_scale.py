@@ -120,7 +120,7 @@ def _suv_factor(header: Any) -> float | None:
 
 
 def _kind(text: str) -> str:
-    if text.startswith("HOUNSFIELD"):  # some exports spell it out
+    if text.startswith("HOUNSFIELD"):  # some exports write this word instead of HU
         return HOUNSFIELD
     return text if text in _TYPES or not text else UNKNOWN_KIND
 

@@ -92,7 +92,7 @@ def _labels(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
 
 
 def _scales(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
-    """Return the dimensions by the first scale of each, then those by further scales."""
+    """Return the dimensions as the first scale of each describes them, then as further ones do."""
     scales = tree.scales(dataset)
     if not any(scales) or len(scales) != dataset.ndim:
         return []

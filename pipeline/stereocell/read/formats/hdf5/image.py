@@ -28,7 +28,7 @@ from stereocell.read.value_scale import scaled
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_LISTED = 12  # datasets that a message names
+_LISTED = 12  # datasets that a message names at most
 
 
 def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str = "") -> Image:

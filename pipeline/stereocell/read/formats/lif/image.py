@@ -26,8 +26,8 @@ from stereocell.storage.location import Location
 
 _BLOCK = struct.Struct("<2I")  # 0x70, and the length of the description that follows
 _ABOUT = struct.Struct("<BQBI")  # 0x2A, bytes of voxels, 0x2A, characters of the block's name
-_EARLY = struct.Struct("<BIBI")  # the same fields in early files, with 4 bytes for the length
-_MAX_NAME = 1000  # characters of a block's name
+_EARLY = struct.Struct("<BIBI")  # like _ABOUT, for early files: the number of bytes has 4 bytes
+_MAX_NAME = 1000  # characters of a block's name that are read and compared
 _AGAIN = "copy or download it again"
 _MARK, _TEST = 0x70, 0x2A
 _MAX_BLOCKS = 100_000

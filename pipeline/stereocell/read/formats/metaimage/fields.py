@@ -22,7 +22,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 NAME = "MetaImage"
-_MAX_HEADER = 1 << 16  # bytes
+_MAX_HEADER = 1 << 16  # bytes in which the header must end
 # field -> its names, in ITK's order of preference
 _NAMES = {
     "Offset": ("Origin", "Position", "Offset"),

@@ -2,7 +2,7 @@
 
 The voxel size is in Angstrom. Columns, rows and sections lie along any axes (MAPC, MAPR, MAPS). The
 first row is the lowest: y grows upwards, and the axes are right-handed. So y is reversed, as in
-images that IMOD writes, and a molecule keeps its hand. Labels are free text and are not read.
+images that IMOD writes, and a molecule keeps its handedness. Labels are free text, not read.
 
 References: https://www.ccpem.ac.uk/mrc-format/mrc2014/, and IMOD's `imodStamp` for signed bytes.
 """

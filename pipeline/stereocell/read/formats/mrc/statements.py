@@ -125,7 +125,7 @@ def settle_order(header: Any) -> tuple[list[int], tuple[str, ...]]:
 
 
 def angle_notes(header: Any) -> tuple[str, ...]:
-    """Return a note if the axes of the cell are not at right angles; 0: not stated."""
+    """Return a note if the cell's axes are not at right angles. Three angles of 0 state nothing."""
     angles = [float(header["cellb"][name]) for name in ("alpha", "beta", "gamma")]
     if not any(angles) or all(abs(angle - _RIGHT_ANGLE) <= _MIN_SKEW for angle in angles):
         return ()

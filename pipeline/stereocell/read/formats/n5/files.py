@@ -14,7 +14,7 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own, require_own_key
 
 _MAX_BYTES = 64 << 20  # bytes of a file of attributes that are read
-_MAX_FOLDERS = 10_000  # folders that a search for datasets visits
+_MAX_FOLDERS = 10_000  # folders that a search for datasets visits at most
 _NAME = "attributes.json"
 
 

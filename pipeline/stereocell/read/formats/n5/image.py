@@ -5,7 +5,7 @@ source wherever a link leads, and unpacks blocks of any size. A block is simple:
 and 32-bit numbers, then one of the usual codecs. So this package decodes it itself.
 
 N5 lists axes fastest first, also in the paths of its blocks; here everything is reversed to z, y,
-x. An absent block is 0.
+x. The voxels of an absent block are read as 0.
 
 References: https://github.com/saalfeldlab/n5 (the specification in its README)
 """
@@ -40,7 +40,7 @@ from stereocell.storage.location import Location
 
 _MAX_LEVELS = 64
 _MAX_TIMES = 100_000
-_LISTED = 12  # datasets that a message names
+_LISTED = 12  # datasets that a message names at most
 _TYPES = {f"{kind}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)}
 _TYPES |= {"float32", "float64"}
 

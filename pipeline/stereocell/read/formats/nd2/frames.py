@@ -18,13 +18,13 @@ from stereocell.storage.library_errors import one_line
 
 BEGIN = b"\xda\xce\xbe\n"  # mark at the start of each chunk, and so of the file
 _HEAD = struct.Struct("<4sIQ")  # mark, length of the name, length of the data
-_PLACE = struct.Struct("<2Q")  # place and size of a chunk in the map
-_END = struct.Struct("<32sQ")  # last bytes of a file: signature, place of the map
+_PLACE = struct.Struct("<2Q")  # entry of the map: byte at which a chunk begins, and its size
+_END = struct.Struct("<32sQ")  # last bytes of a file: signature, byte at which the map begins
 _END_MARK, _MAP_MARK = b"ND2 CHUNK MAP SIGNATURE 0000001!", b"ND2 FILEMAP SIGNATURE NAME 0001!"
 _FRAME = b"ImageDataSeq|"
 _TIME = 8  # bytes of the time stamp before the voxels of a frame
 _VOXELS_AT = 4096  # bytes from a frame's header to its voxels, the value that nd2 uses
-_MAX_MAP = 1 << 30  # bytes of the map
+_MAX_MAP = 1 << 30  # bytes; a larger map is refused
 
 
 class Nd2Frames:
@@ -47,7 +47,7 @@ class Nd2Frames:
         return [] if self._places is None else [n for n in numbers if n not in self._places]
 
     def require(self, number: int) -> None:
-        """Raise SourceError where a frame is not in the file, or not where the map says."""
+        """Raise SourceError where a frame is missing, or is not where the map of chunks says."""
         if self._places is None or number in self._sound:
             return
         if number not in self._places:
@@ -78,7 +78,10 @@ class Nd2Frames:
         self._sound.add(number)
 
     def _listed(self, file: BinaryIO) -> list[tuple[int, int]]:
-        """Return number and place of each frame in the map. Raises OSError and struct.error."""
+        """Return the number and first byte of each frame, from the map at the file's end.
+
+        Raises OSError and struct.error.
+        """
         file.seek(max(0, self._size - _END.size))
         signature, place = _END.unpack(file.read(_END.size))
         if signature != _END_MARK or place >= self._size:

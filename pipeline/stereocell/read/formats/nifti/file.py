@@ -62,7 +62,7 @@ def open_image(location: Location) -> Any:
                 )
             if not isinstance(image, nibabel.nifti1.Nifti1Pair | nibabel.analyze.AnalyzeImage):
                 raise TypeError
-            # An invalid quaternion, unit or type fails here rather than later.
+            # These reads raise an error for an invalid quaternion, unit or type.
             header: Any = image.header
             image.affine.sum()
             if isinstance(image, nibabel.nifti1.Nifti1Pair):
@@ -138,7 +138,7 @@ def require_whole(image: Any, where: str) -> tuple[str, ...]:
             unpack(file, 0, "gzip", most_behind=_MAX_OFFSET)
     if _is_packed(name):
         return ()
-    shape = tuple(map(int, data.shape))  # NumPy's integers would overflow
+    shape = tuple(map(int, data.shape))  # products of NumPy's integers would overflow
     end, size = data.offset + math.prod(shape) * data.dtype.itemsize, os.path.getsize(name)
     if end > size:
         raise SourceError(

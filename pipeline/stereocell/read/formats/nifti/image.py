@@ -131,7 +131,7 @@ def _tables(header: Any) -> list[bytes]:
 
 
 def _image_axis(named: int | None, canonical: Canonical) -> int:
-    """Return the axis (of z, y, x) across which the scanner's images lie.
+    """Return the axis perpendicular to the scanner's images: 0, 1 or 2 for z, y or x.
 
     named  stored axis that the header's `dim_info` names; None: it names none
 
@@ -157,7 +157,7 @@ def _dtype(stored: np.dtype[Any], slope: float, intercept: float) -> np.dtype[An
     if stored.kind == "f":
         return np.dtype(np.float32)
     if stored.itemsize >= 4 and (slope, intercept) == (1, 0):
-        return stored.newbyteorder("=")  # labels keep their numbers; read/cast.py converts the rest
+        return stored.newbyteorder("=")  # label maps keep these integers; cast.py converts others
     limits = np.iinfo(stored)
     return dtype_for([(float(limits.min), float(limits.max), float(slope), float(intercept))])
 

@@ -48,9 +48,9 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
 
 NAME = "NRRD"
-_MAX_HEADER = 1 << 20  # bytes
+_MAX_HEADER = 1 << 20  # bytes of a file that are searched for the header
 _LIST = re.compile(rb"^data ?file:\s*LIST\b.*$", re.MULTILINE | re.IGNORECASE)
-_MAX_LINES = 10_000  # largest `line skip`
+_MAX_LINES = 10_000  # lines before the voxels that are skipped at most (field `line skip`)
 _TYPES = {
     "i1": ("signed char", "int8", "int8_t"),
     "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
@@ -175,7 +175,7 @@ def _header(location: Location) -> tuple[Mapping[str, Any], int]:
         blank = re.search(rb"\n\r?\n", content)
         head = content[: blank.start()] if blank else content
         if listed := _LIST.search(head):
-            head = head[: listed.end()]  # file names follow, not fields
+            head = head[: listed.end()]  # the lines after `data file: LIST` are file names
         fields = nrrd.read_header([f"{line}\n" for line in head.decode("latin-1").splitlines()])
         missing = {"sizes", "type", "encoding"} - set(fields)
         if missing:
@@ -195,7 +195,8 @@ def _directions(
     """
     stated = fields.get("space directions")
     found = np.full((len(shape), 3), np.nan)
-    # only lengths are stated; the axes of space are the first three that have one
+    # Only lengths are stated. If `kinds` and labels name no axes of space, the first three axes
+    # with a length count as them.
     if stated is None:
         lengths = axis_lengths(fields, shape)
         kinds = list(fields.get("kinds", ()))

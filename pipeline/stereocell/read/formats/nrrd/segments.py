@@ -18,7 +18,7 @@ from stereocell.model.object_notes import ObjectNotes
 from stereocell.read.stated_numbers import numbers_of
 
 _KEY = re.compile(r"Segment([0-9]{1,6})_(ID|LabelValue|Name|Color|Layer)")
-_LONGEST = 200  # characters of a name
+_LONGEST = 200  # characters; longer names of segments are cut
 
 
 def segments_of(fields: Mapping[str, Any]) -> tuple[str, ObjectNotes]:

@@ -35,7 +35,7 @@ def count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None
         return others is not None and outside + others.key_of(key) in names
 
     is_listed = stored.store.is_local and number_of(stored.chunks, spans) <= MOST_COUNTED
-    if stored.shards and is_listed:  # each index would be a request at an address
+    if stored.shards and is_listed:  # at an address, each shard's index would need a request
         pairs = zip(stored.chunks, spans, strict=True)
         touched = [touched_along(size, ranges) for size, ranges in pairs]
         inner = absent_in_shards(stored, touched, is_present)

@@ -12,7 +12,7 @@ ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
 def zarr_root_in(names: Collection[str]) -> str | None:
     """Return the folder of a Zarr group among the members of a zip file, with a final slash.
 
-    It is the root, or else the only folder in it. None: there is no group.
+    The group lies at the root (empty text), or else in the only folder. None: there is no group.
     """
     if any(file in names for file in ZARR_FILES):
         return ""

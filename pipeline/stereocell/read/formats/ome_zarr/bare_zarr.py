@@ -36,8 +36,8 @@ from stereocell.read.statements import Statement, Trust
 from stereocell.read.value_scale import ignored_note
 from stereocell.storage.location import Location
 
-_LISTED = 12  # arrays that a message names
-_MAX_NODES = 1000  # members of a group that are looked at
+_LISTED = 12  # arrays that a message names at most
+_MAX_NODES = 1000  # members of a group that are searched for a volume at most
 
 
 def read_array(location: Location, store: Store, path: str, *, axes: str = "") -> Image:

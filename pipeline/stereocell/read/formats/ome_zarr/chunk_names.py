@@ -123,6 +123,6 @@ def _listed(location: Location, array: "zarr.Array[Any]") -> set[str]:
                     forms.add(".".join(["c"] * entry.name.startswith("c") + ["0"] * count))
                 elif entry.is_dir() and (entry.name == "c" or entry.name.isdecimal()):
                     forms.add("/".join(["c"] * (entry.name == "c") + ["0"] * count))
-    except OSError:  # the reader reports it
+    except OSError:  # the reader reports a folder that can't be listed
         return set()
     return forms

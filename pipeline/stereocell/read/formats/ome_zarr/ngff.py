@@ -29,7 +29,7 @@ _FIXED = ("t", "c", "z", "y", "x")  # axes of versions 0.1 and 0.2
 _WITHOUT_AXES = ("0.1", "0.2", "")
 _WITHOUT_SPACING = ("0.1", "0.2", "0.3")
 KNOWN = ("0.1", "0.2", "0.3", "0.4", "0.5", "0.6")
-_DEEPEST = 20  # sequences nested within each other
+_DEEPEST = 20  # sequences nested within each other; deeper ones are refused
 
 
 def version_of(ome: Mapping[str, Any]) -> str:

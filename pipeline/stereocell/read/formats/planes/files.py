@@ -24,11 +24,11 @@ from stereocell.storage.library_errors import collected_log, one_line
 from stereocell.storage.location import Location
 
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
-# bytes at the end of a PNG that are searched for its last chunk; programs may append some
+# bytes at the end of a PNG that are searched for its last chunk, since programs may append others
 _TAIL = 1024
-_PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; type 3, a palette, is refused
+_PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # samples by colour type; type 3, a palette, is refused
 _EXIF_ORIENTATION = 274  # tag of TIFF and EXIF
-_SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
+_SAMPLES = {"L": 1, "RGB": 3}  # samples of a pixel by pillow's mode; other modes are refused
 
 
 def read_head(path: str, named: str) -> Head:

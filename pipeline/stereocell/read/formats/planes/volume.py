@@ -11,7 +11,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read.formats.planes.place import Place, natural
 from stereocell.read.image import MAX_CHANNELS
 
-_SHOWN = 4  # file names in a message
+_SHOWN = 4  # file names that a message lists at most
 # ratio of the range of numbers to the number of files; above it, the numbers are no sequence
 _SPARSE = 20
 

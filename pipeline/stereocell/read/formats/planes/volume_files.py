@@ -15,7 +15,7 @@ from stereocell.storage.location import Location
 
 Key = tuple[int, int, int]  # time, channel, plane
 _AXES = ("t", "c", "z", "y", "x")
-_SHOWN = 4  # names in a message
+_SHOWN = 4  # names or numbers that a note lists at most
 _NUMBER = re.compile(r"[0-9]{1,9}$")  # number at the end of a channel's name
 
 

@@ -15,7 +15,7 @@ from tifffile import TiffPage
 
 from stereocell.read.value_scale import ValueScale
 
-_METADATA, _NODATA = 42112, 42113  # tags
+_METADATA, _NODATA = 42112, 42113  # TIFF tags GDAL_METADATA and GDAL_NODATA
 _MAX_CHARACTERS = 1 << 20
 
 
@@ -69,7 +69,7 @@ def _missing(text: Any, stored: np.dtype[Any]) -> tuple[float, ...]:
     if stored.kind in "iu":
         limits = np.iinfo(stored)
         if not value.is_integer() or not limits.min <= value <= limits.max or value == limits.min:
-            return ()  # the smallest number is read as itself anyway
+            return ()  # no voxel can have this number, or it already is the smallest one
     return (value,)
 
 

@@ -32,7 +32,7 @@ from stereocell.read.series import lines
 from stereocell.storage.library_errors import collected_log, one_line
 from stereocell.storage.location import Location
 
-logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors raise exceptions here
+logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors also raise exceptions
 _OME_NAMES = (".ome.tif", ".ome.tiff", ".ome.tf2", ".ome.tf8", ".ome.btf")
 _BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's message
 

@@ -21,8 +21,8 @@ from stereocell.read.formats.tiff.open_file import open_tiff, require_directorie
 from stereocell.storage.location import Location, require_own
 
 INDEX = "NDTiff.index"
-_MAX_INDEX = 64 << 20  # bytes
-_MARK = struct.pack("<I", 483729)  # at byte 8 of each file of a set
+_MAX_INDEX = 64 << 20  # bytes; a larger index is ignored
+_MARK = struct.pack("<I", 483729)  # mark at byte 8 of each file of a set
 _MARK_AT = 8
 
 

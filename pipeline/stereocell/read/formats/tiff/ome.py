@@ -41,11 +41,11 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 # Limits of numbers in OME-XML and tags: the libraries allocate lists of such lengths at once.
-_MAX_SIDE = 10_000_000  # voxels along an axis
-_MAX_LEVELS = 64  # levels of a pyramid
+_MAX_SIDE = 10_000_000  # voxels along x or y; an image with more is refused
+_MAX_LEVELS = 64  # coarser levels of a pyramid; a file with more is refused
 _SUB_IFDS = 330  # TIFF tag SubIFDs: offsets of a page's coarser levels
 _VALUE_TYPE = Subject("type of the voxels")
-_NUMPY_NAMES = {"float": "float32", "double": "float64", "bit": "bool"}  # by OME-XML's names
+_NUMPY_NAMES = {"float": "float32", "double": "float64", "bit": "bool"}  # OME-XML's name -> NumPy's
 _CLAIM = re.compile(r"""\b(Size[XYZCT]|PlaneCount|IFD)\s*=\s*["']\s*(\d+)""")
 
 

@@ -135,7 +135,7 @@ class _Set:
     def _settled(self, uuid: str, name: str) -> tuple[str, str]:
         """Return the name of the file with a UUID, and a note if it differs from `name`."""
         if not self._is_companion and uuid == self._root_uuid:
-            return name, ""  # this is the opened file itself, under any name
+            return name, ""  # the UUID is that of the opened file, whatever its name is
         path = self._folder / name
         is_there = bool(name) and _require_inside(self._location, name)
         is_own = is_there and os.path.samefile(path, self._own)

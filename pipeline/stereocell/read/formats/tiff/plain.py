@@ -155,7 +155,7 @@ def _left_out(found: Sequence[TiffPageSeries], chosen: TiffPageSeries) -> list[s
 def _undescribed(tiff: TiffFile, found: Sequence[TiffPageSeries]) -> list[str]:
     """Return a note on pages that belong to no image, if the file's description counts fewer."""
     largest = max(found, key=lambda one: one.size)
-    if largest.kind == "ndtiff":  # already compared with its index
+    if largest.kind == "ndtiff":  # ndtiff.py has compared the pages with the index
         return []
     levels, total = [level for one in found for level in one.levels], len(tiff.pages)
     if largest.kind == "lsm":  # every second page is a thumbnail

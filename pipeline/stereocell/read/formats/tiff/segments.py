@@ -64,7 +64,7 @@ def _sizes(key: Any, count: int) -> NDArray[np.int64]:
     row = -(-width * samples * key.bitspersample // 8)
     if key.is_tiled:
         return np.full(count, key.tiledepth * key.tilelength * row, np.int64)
-    strips = -(-key.imagelength // key.rowsperstrip)  # strips of a plane
+    strips = -(-key.imagelength // key.rowsperstrip)  # number of strips of one plane
     first_row = np.arange(count) % strips * key.rowsperstrip
     return np.minimum(key.rowsperstrip, key.imagelength - first_row) * row
 

@@ -207,7 +207,7 @@ def _lut_color(lut: Any) -> Color | None:
 
 def _lsm(tiff: TiffFile, page: TiffPage) -> Stated:
     meta = _mapping(tiff.lsm_metadata)
-    z, y, x = (_times(1e6, meta.get(f"VoxelSize{axis}")) for axis in "ZYX")  # from metres
+    z, y, x = (_times(1e6, meta.get(f"VoxelSize{axis}")) for axis in "ZYX")  # from m to um
     channels = _mapping(meta.get("ChannelColors"))
     names = tuple(_name(name) for name in channels.get("ColorNames") or ())
     colors = tuple(_rgb(color) for color in channels.get("Colors") or ())
@@ -234,7 +234,7 @@ def _metaseries(tiff: TiffFile, page: TiffPage) -> Stated:
 
 def _micromanager(tiff: TiffFile, page: TiffPage) -> Stated:
     summary = _mapping(_mapping(tiff.micromanager_metadata).get("Summary"))
-    side = _times(1.0, summary.get("PixelSize_um") or None)  # 0: not calibrated
+    side = _times(1.0, summary.get("PixelSize_um") or None)  # 0 means that no size was calibrated
     z = _times(1.0, summary.get("z-step_um") or None)
     names = summary.get("ChNames")
     return Stated((z, side, side), tuple(map(_name, names)) if isinstance(names, list) else ())
@@ -261,7 +261,7 @@ def _shaped(tiff: TiffFile, page: TiffPage) -> Stated:
     return Stated((z, y, x))
 
 
-# by tifffile's flags; the first one that is set counts
+# tifffile's flag for a kind of file -> reader of its metadata; the first flag that is set counts
 _READERS: dict[str, Callable[[TiffFile, TiffPage], Stated]] = {
     "is_lsm": _lsm,
     "is_stk": _stk,
