@@ -59,7 +59,7 @@ describeInChromium("by gaze alone", () => {
               if (!regions().some(isNew) && pages > 3) break;
             }
           };
-          /** The page of a channel or lamp, opened from the colours that a glance at its swatch shows. */
+          /** Tries the page of a channel or lamp. A glance at its swatch shows colours, which lead to the page. */
           const walkGroup = (swatch: string) => {
             const more = swatch.replace("/open", "/more");
             hands.gazeFor(swatch, 0.6);
