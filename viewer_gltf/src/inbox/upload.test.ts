@@ -7,7 +7,7 @@ import { UploadFiles } from "./upload_files";
 const PIECE = 2 ** 16;
 const TOTAL = 5 * PIECE;
 
-/** Lets work finish that waits for no timer. Reading a blob takes several turns of Node's event loop. */
+/** Lets work finish that waits for no timer. Reading a blob takes several turns of the event loop. */
 async function rest(): Promise<void> {
   for (let i = 0; i < 20; i++) await new Promise((resolve) => setImmediate(resolve));
 }
@@ -39,7 +39,7 @@ function filesOf(content = CONTENT): UploadFiles {
 
 type Fault = "cut" | "lost" | "behind" | number;
 
-/** A server that stores bytes like the real one. Each request gets the next of the faults; null: none. */
+/** A server that stores bytes like the real one. Each request gets the next fault; null: none. */
 class Store {
   bytes = new Uint8Array(0);
   readonly requests: string[] = [];

@@ -59,7 +59,7 @@ describeInChromium("by gaze alone", () => {
               if (!regions().some(isNew) && pages > 3) break;
             }
           };
-          /** Tries the page of a channel or lamp. A glance at its swatch shows colours, which lead to the page. */
+          /** Tries the page of a channel or lamp, to which the colours lead that its swatch shows. */
           const walkGroup = (swatch: string) => {
             const more = swatch.replace("/open", "/more");
             hands.gazeFor(swatch, 0.6);
