@@ -22,12 +22,15 @@ _GOLDEN = np.pi * (3 - 5**0.5)
 
 
 class Truth(Protocol):
-    """The true shapes of cells; `place` counts cells from 0."""
+    """The true shapes of cells; `place` is the index of a cell, from 0."""
 
     volumes: NDArray[np.float64]  # um^3
 
     def distances(self, place: int, found: Nearest) -> NDArray[np.float64]:
-        """Return distances (n,), um, of points on each of both surfaces from the other surface."""
+        """Return the distances between a cell's true surface and the found one, (n,), um.
+
+        They are measured from points on either surface.
+        """
 
 
 class BallsCut:
@@ -51,7 +54,10 @@ class BallsCut:
         return np.concatenate([there, found.distances(self._points(place))])
 
     def _planes(self, place: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return normals (m, 3) and distances (m,) of the planes that may cut the ball."""
+        """Return the planes that may cut a cell's ball, as normals (m, 3) and distances (m,).
+
+        Distances are in um from the ball's centre.
+        """
         ways = np.delete(self._centres, place, 0) - self._centres[place]
         lengths = np.linalg.norm(ways, axis=1)
         near = lengths < 2 * self._radius

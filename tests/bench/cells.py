@@ -77,7 +77,7 @@ class Case:
 
     @property
     def step_um(self) -> float:
-        """The step of the lattice of a bundle that has only this tile."""
+        """The spacing, um, of the lattice to which a bundle of only this tile rounds positions."""
         sizes = np.multiply(self.labels.shape, self.spacing_um)
         return choose_step(float(sizes.max())) * 1e6
 
@@ -96,11 +96,11 @@ class Figures:
     triangles: float  # per cell
     mean: float
     p95: float
-    bias: tuple[float, float, float]  # 2nd, 50th and 98th percentile
-    faulty: int  # faulty objects as made
-    faulty_stored: int  # faulty objects on the lattice
+    bias: tuple[float, float, float]  # errors of volumes, %: 2nd, 50th and 98th percentile
+    faulty: int  # number of objects that are faulty or empty as the program made them
+    faulty_stored: int  # the same number after positions are rounded to the lattice of our .glb
     overlap: float
-    size: int  # bytes
+    size: int  # bytes of the .glb of all objects
 
 
 Made = list[tuple[str, Mesh, Spent]]
@@ -206,7 +206,8 @@ def search_error(labels: NDArray[np.int32], spacing_um: Triple, wanted: float) -
 def measure(mesh: Mesh, case: Case) -> Figures:
     """Return the figures of a mesh of all the case's objects."""
     count = len(case.truth.volumes)
-    # Twice the needed step. A mesh that leaves its box by more gets a coarser lattice.
+    # The lattice of a bundle is wide enough for a box of twice the size. A mesh that exceeds even
+    # that gets a coarser lattice.
     step = max(case.step_um, choose_step(float(np.ptp(mesh.positions, axis=0).max()) / 2) * 1e6)
     parts = split(mesh, count)
     there = [k for k in range(count) if len(parts[k].triangles)]  # an object may vanish
@@ -232,7 +233,7 @@ def at_fault(part: Mesh) -> bool:
 
 
 def stored(part: Mesh, step_um: float) -> Mesh:
-    """Return a mesh as a bundle stores it."""
+    """Return a mesh with its positions rounded to the lattice, as a bundle stores them."""
     at = put_on_lattice(part.positions.astype(np.float64), step_um)
     return replace(part, positions=at.astype(np.float32))
 

@@ -1,4 +1,7 @@
-"""Write the head phantom in a cube of voxels, for `make bench-fps`: fps_volume.py OUT EDGE."""
+"""Write the head phantom for `make bench-fps`: fps_volume.py OUT EDGE.
+
+OUT is an OME-TIFF of a cube with EDGE voxels a side.
+"""
 
 import os
 import sys

@@ -40,7 +40,7 @@ _SAMPLE = 2_000_000  # voxels from which a peer finds its threshold
 _POINTS = 20_000  # points of a true boundary whose distance to the found one is measured
 PEERS: dict[str, Callable[[NDArray[np.float32]], float]] = {
     "Otsu": filters.threshold_otsu,
-    # Its own tolerance, the least difference of two voxels, may never be reached.
+    # scikit-image's own tolerance, the least difference of two voxels, may never be reached.
     "Li": lambda values: filters.threshold_li(values, tolerance=1e-5 * float(np.ptp(values))),
     "isodata": filters.threshold_isodata,
     "triangle": filters.threshold_triangle,
@@ -150,7 +150,7 @@ def _solids(search: LevelSearch) -> Iterable[tuple[str, Mask, tuple[float, ...]]
         value = float(peer(sample))
         yield name, values > value, (value,)
     window = max(3, 2 * round(8 * min(case.spacing_um) / case.spacing_um[1]) + 1)
-    spread = float(np.ptp(np.percentile(sample, (1, 99)))) / 2  # for uint8, Sauvola uses 128
+    spread = float(np.ptp(np.percentile(sample, (1, 99)))) / 2  # half the range: 128 for uint8
     local = np.stack(
         [filters.threshold_sauvola(plane, 4 * window + 1, r=spread) for plane in values]
     )

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class VolumeLevels:
-    """One volume's levels.
+    """The candidate iso-values ("levels") of one volume.
 
     source    volumes of one source are held out together
     features  float64 (levels, 6)
@@ -57,7 +57,7 @@ def measure(number: int) -> VolumeLevels:
     search = search_levels(case)
     levels, shown = search.found.all_levels, search.found.shown()
     if clear_of(levels) and not shown:
-        levels = ()  # noise or uneven light; no level is to be chosen
+        levels = ()  # the tests rule out noise or uneven light, so no level may be chosen
     clear = [k for k, level in enumerate(levels) if level in shown]
     scores = [
         0.0 if search.truth is None else dice(search.values > level.value, search.truth)

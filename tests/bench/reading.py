@@ -31,8 +31,8 @@ from stereocell.transfer.joint_histogram import sample_boxes
 from support.phantoms import write_ome_zarr
 
 REAL = (194, 512, 512)
-REGION, CHANNELS = Box((0, 0, 0), (194, 5508, 10908)), 70  # the dataset
-CHUNK = (32, 128, 128)  # four to a tile's width, six to its depth, as in the sample
+REGION, CHANNELS = Box((0, 0, 0), (194, 5508, 10908)), 70  # voxels of the whole CyCIF dataset
+CHUNK = (32, 128, 128)  # voxels (z, y, x): a tile is four chunks wide and some six deep
 MAX_READ = 1.3  # ratio of the bytes read to the bytes of touched chunks
 
 
@@ -130,7 +130,10 @@ def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
 
 
 def measure_windows(folder: Path, source: Path) -> float:
-    """Return the bytes read for the window of a tile of REAL, over the bytes that it needs."""
+    """Return the ratio of the bytes read for the display window of a tile of REAL to those needed.
+
+    Needed are a coarse level, and the blocks in which edges are searched.
+    """
     out = folder / "windows"
     with counting(folder) as (address, sent):
         plan(f"{address}/{source.name}", out, (1, 1), REAL, "0")
@@ -146,7 +149,10 @@ def measure_windows(folder: Path, source: Path) -> float:
 
 
 def chop_sample(folder: Path, tile: tuple[int, int, int]) -> Path:
-    """Return 3 x 3 tiles; each has as many chunks as a tile of REAL has chunks of CHUNK."""
+    """Write a sample of 3 x 3 tiles, and return its path.
+
+    Each tile has as many chunks as a tile of REAL has chunks of CHUNK.
+    """
     path = folder / f"chopped_{'_'.join(map(str, tile))}.ome.zarr"
     if not path.exists():
         voxels: np.ndarray = zarr.open_array(make_sample(folder, (3, 3), tile) / "0")[:1]  # type: ignore

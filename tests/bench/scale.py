@@ -50,8 +50,8 @@ MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512
 WHOLE = len(cut(REGION, REAL)) * CHANNELS  # units of the CyCIF dataset
 PRICE = 0.04  # dollars for a core-hour: about what clouds ask for a core with 4 GB
 GIB = 1024**3
-MAX_GROWTH = 0.1  # growth of a process's peak when there are four times as many tiles
-MAX_BYTES = 2e9  # peak of the process that builds a unit of REAL
+MAX_GROWTH = 0.1  # largest relative growth of a process's peak memory with four times the tiles
+MAX_BYTES = 2e9  # largest peak memory of the process that builds a unit of REAL
 
 # Runs in a process of its own, which builds one unit and measures its own memory meanwhile.
 WATCHED = """

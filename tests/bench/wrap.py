@@ -51,12 +51,13 @@ Triple = tuple[float, float, float]
 @dataclass(frozen=True)
 class Input:
     name: str
-    field: NDArray[np.float32]  # smoothed, above its background
+    field: NDArray[np.float32]  # smoothed voxels minus their background
     spacing: Triple
     iso: float
-    # Shares of alpha, chosen so that our mesh has no more faces and no larger distances.
-    grid: float  # coarsest spacing of voxels, of which some may be left out
-    error: float  # error of simplification
+    # Both are shares of alpha, chosen so that our mesh has no more faces and no larger distances
+    # than the paper's.
+    grid: float  # largest spacing of the voxels that are used; the voxels between are left out
+    error: float  # largest error of simplification
 
 
 def inputs() -> Iterator[Input]:

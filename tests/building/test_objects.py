@@ -38,7 +38,7 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def out(sample: Path) -> Path:
-    """Two tiles, one image channel, and a table with errors of three kinds."""
+    """A build of two tiles, one image channel, and a table with errors of three kinds."""
     table = table_beside(sample)
     lines = table.read_text("utf-8").splitlines()
     lines = [lines[0], *lines[2:], "9999,T cell" + ",1" * 12, "8888,B cell" + ",2" * 12]

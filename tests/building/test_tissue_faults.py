@@ -77,7 +77,7 @@ def learning_at_once() -> Iterator[None]:
 
 
 def learn(voxels: NDArray[Any], _: object, *, options: TissueOptions) -> SimpleNamespace:
-    """Return classes by brightness, without learning, which has tests of its own."""
+    """Stand in for learning, which has its own tests: return classes by brightness."""
     count = int(options.classes)
     place = voxels / voxels.max() * (count - 1)
     shares = np.stack([np.clip(1 - np.abs(place - k), 0, 1) for k in range(count)])
@@ -108,7 +108,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def undisturbed(built: Path) -> Path:
-    """The same with two classes."""
+    """A copy of `built` to which two classes were added without a fault."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "run_report", lambda out: None)
         out = copy(built, built.parent / "undisturbed")
@@ -117,7 +117,7 @@ def undisturbed(built: Path) -> Path:
 
 
 def copy(out: Path, to: Path, source: Path | None = None) -> Path:
-    """Copy a build, and adapt its plan."""
+    """Copy a build, and adapt the paths in its plan. `source`: where the input is copied to."""
     shutil.copytree(out, to)
     text = (to / "plan.json").read_text("utf-8").replace(f'"{out}', f'"{to}')
     if source is not None:
@@ -168,7 +168,11 @@ def only_line(capfd: pytest.CaptureFixture[str]) -> str:
 
 
 def run_until(out: str, flags: list[str], event: str, place: str) -> None:
-    """Run the command in this process, which dies when it first changes a path in this way."""
+    """Run `tissue` in this process, and kill the process at an event of Python's audit hooks.
+
+    event  name of the audit event, such as os.rename
+    place  end of the path that the event is about
+    """
 
     def hook(name: str, arguments: tuple[Any, ...]) -> None:
         if name == event:
@@ -187,7 +191,7 @@ def run_until(out: str, flags: list[str], event: str, place: str) -> None:
 
 
 def fork_and_run() -> None:
-    """Run each line of the input in a process of its own."""
+    """Call `run_until` in a fork with the arguments in each line of the input; print exit codes."""
     for line in sys.stdin:
         child = os.fork()
         if child == 0:
@@ -198,7 +202,11 @@ def fork_and_run() -> None:
 
 @pytest.fixture(scope="module")
 def kill() -> Iterator[Kill]:
-    """Run the command in a process that is killed at a moment, which must be reached."""
+    """Return a function that runs `tissue` in a process that is killed at a moment.
+
+    The moment is an event and the end of a path, as in `run_until`. The test fails if the process
+    does not reach it.
+    """
     paths = os.pathsep.join(filter(None, [str(TESTS), os.environ.get("PYTHONPATH")]))
     with subprocess.Popen(
         [sys.executable, __file__],

@@ -36,11 +36,14 @@ def set_points(mesh, move):
 
 
 def swell(factor):
-    """Return a change that makes the sphere larger; the cut stays in its plane."""
+    """Return a function that enlarges a tile's mesh about the sphere's centre.
+
+    The cut stays in its plane, because the plane contains the centre.
+    """
     return lambda mesh: set_points(mesh, lambda p: spheres.CENTER + factor * (p - spheres.CENTER))
 
 
-RISE = 1.1 * 0.5  # um, lod2's error; vertices may lie so far outside to keep the volume
+RISE = 1.1 * 0.5  # um, lod2's error; to keep the volume, vertices may lie this far outside
 
 
 def radii(bundle, level, shift_um=(0, 0, 0)):
@@ -98,7 +101,7 @@ def test_coarser_levels_are_made_again_from_an_edited_finest_level(bundle, edit)
     assert "lod2 within" in line
     assert read((edited / other).read_bytes())[0]["meshes"]  # the neighbour is not touched
     assert chain(edited, "r0_c1") == chain(bundle, "r0_c1")
-    # The stage states no settings, so defaults apply.
+    # The stage states no settings, so lod1 is made with the defaults: without maps.
     document, _ = read((edited / "channels/CD31/r0_c0/lod1.glb").read_bytes())
     (primitive,) = document["meshes"][0]["primitives"]
     assert "TEXCOORD_0" not in primitive["attributes"]

@@ -18,7 +18,7 @@ from support.stages import edit_over
 
 
 def put(path, value):
-    """Return an edit of one attribute."""
+    """Return a function that sets one attribute of a stage."""
     return lambda stage: stage.GetAttributeAtPath(path).Set(value)
 
 
@@ -38,7 +38,7 @@ def test_color_edited_over_the_stage_reaches_manifest_and_meshes(bundle, edit):
 
 
 def texels(data):
-    """Return level 0 of a texture as one row of bytes."""
+    """Return the finest resolution level of a KTX2 texture as one row of bytes."""
     offset, length, _ = np.frombuffer(data, "<u8", 3, 80)
     return np.frombuffer(zstandard.decompress(data[offset : offset + length]), np.uint8)
 
@@ -264,12 +264,12 @@ def test_display_colors_at_points_are_those_of_the_vertices(edit):
 
 
 def put_new(stage, path, name, kind, value):
-    """Return an edit that sets an attribute, which it creates if the prim lacks it."""
+    """Set an attribute of a prim on a stage; create the attribute if the prim lacks it."""
     stage.OverridePrim(path).CreateAttribute(name, getattr(Sdf.ValueTypeNames, kind)).Set(value)
 
 
 def bind(stage, where, *, strength="strongerThanDescendants", purpose=""):
-    """Bind a green material to a prim; an empty `where` leaves it unbound."""
+    """Define a green material on a stage, and bind it to the prim `where`; "": to no prim."""
     material = UsdShade.Material.Define(stage, "/Specimen/Mine")
     shader = UsdShade.Shader.Define(stage, "/Specimen/Mine/surface")
     shader.CreateIdAttr("UsdPreviewSurface")

@@ -28,7 +28,9 @@ def remove_built(stage):
 
 
 def latlong(towards, color, rows=32):
-    """Return an image (rows, 2 rows, 3) that is black except for a disc of 0.2 radians.
+    """Return an image (rows, 2 rows, 3) that is black except for a disc of radius 0.2 radians.
+
+    The disc's middle lies in the direction `towards`.
 
     By OpenEXR's documentation, longitude is +pi at the left; 0 is +z, and pi / 2 is +x.
     """
@@ -40,7 +42,7 @@ def latlong(towards, color, rows=32):
 
 
 def brightest(image):
-    """Return the direction of the brightest texel by OpenEXR's documentation."""
+    """Return the direction (x, y, z) of a latlong image's brightest texel, after OpenEXR."""
     rows, columns = image.shape[:2]
     row, column = np.unravel_index(image.sum(axis=2).argmax(), (rows, columns))
     return direction(row, column, rows, columns)
@@ -54,7 +56,7 @@ def direction(row, column, rows, columns):
 
 
 def middle_of_light(image):
-    """Return the mean direction from which light comes."""
+    """Return the mean direction (x, y, z) from which a latlong image's light comes."""
     rows, columns = image.shape[:2]
     total = np.zeros(3)
     for row in range(rows):

@@ -49,7 +49,7 @@ def test_edit_over_the_stage_recolours_a_channel_and_its_bundle(edit, tmp_path, 
 
 
 def scene_over(stages: dict[str, Path], path: Path) -> Usd.Stage:
-    """Return a new scene, stored at a path, that references stages as /World/NAME."""
+    """Return a new scene, to be saved at a path, that references each stage as /World/NAME."""
     layer = Sdf.Layer.CreateNew(str(path))
     layer.defaultPrim = "World"
     stage = Usd.Stage.Open(layer)
@@ -70,7 +70,7 @@ def scene(tmp_path):
 
 
 def bundle_of(scene: Usd.Stage, folder: Path) -> tuple[list[str], Path]:
-    """Return the reported lines and the bundle of a saved scene."""
+    """Save a scene and write its bundle; return the reported lines and the bundle."""
     scene.GetRootLayer().Save()
     return write(Path(scene.GetRootLayer().realPath), folder / "bundle"), folder / "bundle"
 

@@ -16,7 +16,7 @@ FOUND = Resolved("/scratch/dicom", ("a note",))
 
 
 def source_of(options: argparse.Namespace) -> str:
-    """Stand in for a command: return what it would read."""
+    """Stand in for a command: return the source that it would read."""
     return resolve(options.input).source
 
 

@@ -32,12 +32,12 @@ def test_the_flags_of_a_plan_are_found() -> None:
 
 
 @pytest.mark.parametrize("flag", FLAGS)
-def test_two_hyphens_are_no_value(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_hyphens_are_refused_as_a_value(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
     expected = f"{flag} is '--', expected a value (a file of this name is ./--)"
     assert refusal(capsys, [*PLAN, f"{flag}=--"]) == expected
 
 
-def test_two_hyphens_are_no_value_of_other_commands(capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_commands_refuse_two_hyphens_as_a_value(capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["export", "o", "x.stl", "--scale=--"], ["tissue", "o", "--model=--"]):
         assert refusal(capsys, words).startswith(f"{words[-1][:-3]} is '--', expected a value")
 
@@ -70,7 +70,7 @@ def test_bytes_that_are_not_utf8_are_named(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="arguments of Windows are no bytes")
-def test_bytes_of_a_shell_are_named() -> None:
+def test_bytes_that_a_shell_passes_are_named() -> None:
     words = [sys.executable, "-m", "stereocell.cli", "plan", b"\xff", "-o", "out"]
     done = subprocess.run(words, capture_output=True, text=True)
     assert done.returncode == 2
@@ -102,7 +102,7 @@ def test_a_message_cuts_long_values_and_leaves_others() -> None:
     assert line == f"name '{'y' * 199}...{'y' * 59}' is unknown"
 
 
-def test_an_unknown_preset_shows_no_file_of_ours(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_preset_shows_no_path_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("x" * 300, "../presets/cycif", "a\nb"):
         line = refusal(capsys, ["settings", "--preset", name])
         assert line.startswith("preset ")
@@ -119,7 +119,7 @@ def test_an_address_without_a_place_is_refused(
 
 
 @pytest.mark.parametrize("scale", ["1e300", "1e-300", "1e10", "1e-10"])
-def test_scales_have_bounds(scale: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scales_of_exports_have_bounds(scale: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(UsageError, match="expected 1e-09 to 1e"):
         ExportOptions(scale=float(scale))
 

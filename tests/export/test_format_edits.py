@@ -14,7 +14,7 @@ from stereocell.storage.file_list import encode, list_files
 from support.edit_cases import CASES, EditCase
 from support.exhaustive import sweep
 
-# Endings of the same writer take over the same edits, and turntables take long.
+# These endings are not tried: their writers are tried by another ending, or turntables take long.
 ALIKE = (".gltf", ".usda", ".mp4", ".webm", ".raw", ".nii.gz")
 TRIED = [ending for ending in FORMATS if ending not in ALIKE]
 # If the only channel with a surface is hidden, it is drawn nevertheless, to draw anything at all.
@@ -22,7 +22,7 @@ ONLY_ONE = "visibility of `/Specimen/Shown/CHANNEL`"
 
 
 def write(stage: Path, folder: Path, ending: str) -> tuple[str, list[str]]:
-    """Export; return a digest of the files, and the lines on edits."""
+    """Export a stage; return a digest of the files, and the lines on edits that are left out."""
     folder.mkdir()
     lines: list[str] = []
     options = ExportOptions(width=200) if ending == ".png" else ExportOptions()
@@ -32,7 +32,7 @@ def write(stage: Path, folder: Path, ending: str) -> tuple[str, list[str]]:
 
 
 def unlike(case: EditCase, has_changed: bool, lines: list[str], ending: str) -> bool:
-    """Return whether file and lines contradict each other about an edit."""
+    """Return whether a file and the reported lines contradict each other about an edit."""
     if case.what == ONLY_ONE and FORMATS[ending].is_seen:
         return False
     if FORMATS[ending].lacks is None:

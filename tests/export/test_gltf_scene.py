@@ -60,7 +60,7 @@ def test_tiles_meet_without_a_gap(sphere_stage: Path, tmp_path: Path) -> None:
 
 
 def level_of(stage: Path, path: Path, options: ExportOptions) -> str:
-    """Export; return the level of detail that the reported line names."""
+    """Export a stage; return the level of detail that the reported line names."""
     line = export_stage(stage, path, options=options)
     return line.partition(" at ")[2].partition(",")[0]
 

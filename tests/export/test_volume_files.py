@@ -24,7 +24,7 @@ NM = 1e-6  # mm
 
 @pytest.fixture(scope="module")
 def counted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The stage with CD31's voxels as measured; each differs from its neighbours."""
+    """The stage with CD31's voxels as measured. Each voxel differs from its neighbours."""
     tiles = [spheres.tile(column, (spheres.RED,), measured=True) for column in (0, 1)]
     return write_tiles(tmp_path_factory.mktemp("counted"), tiles)
 
@@ -34,7 +34,7 @@ COUNTS = spheres.counts((0, 0, 0), WHOLE)
 
 
 def unit(ending: str) -> float:
-    """Return the length of 1 um in SimpleITK, which converts NIfTI's unit to mm."""
+    """Return the number that 1 um has in SimpleITK, which reads NIfTI in mm."""
     return 1e-3 if ending.startswith("nii") else 1.0
 
 

@@ -23,7 +23,7 @@ FEWEST = 150
 
 
 def look_up(host: str, port: int, *args: Any, **options: Any) -> list[Any]:
-    """Know three names, as a name server of an attacker would, and numbers."""
+    """Look up hosts like an attacker's name server that knows three names; accept IP addresses."""
     known = {
         "inside.example": ["10.0.0.5"],
         "both.example": ["93.184.216.34", "127.0.0.1"],
@@ -40,7 +40,7 @@ real_look_up = socket.getaddrinfo
 
 
 def send(port: int, one: Request, item: str) -> tuple[int, bytes]:
-    """Send a request as it is, whatever a library would say; return status and content."""
+    """Send a request unchanged, even if it is malformed; return status and content."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
     headers = {"Host": "localhost", **one.headers}
     if "Content-Length" not in headers and "Transfer-Encoding" not in headers:

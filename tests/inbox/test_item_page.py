@@ -184,14 +184,14 @@ def test_a_tile_in_the_view_gets_the_voxels_of_the_upload_before_any_build(
         item, other = (hand_in(client, head, name) for name in ("a.nii", "b.nii"))
         manifest, bricks, volume = look(client, item)
         box = tuple(manifest["specimen"]["bounds_um"].values())
-        with server.inbox.find(other).reading, server.inbox.reader._busy:  # it reads another item
+        with server.inbox.find(other).reading, server.inbox.reader._busy:  # as while reading other
             found = sent(server.port, bricks, [volume], box)
         assert found.done[1]["reason"] == "complete"
         (tree,) = found.trees.values()
         low, high = manifest["channels"][0]["window"]
         expected = np.clip((f_phantom(1) - low) / (high - low) * 255, 0, 255)
         voxels = reconstruct(tree.table, tree.frames)[1:-1, 1:-1, 1:-1]
-        # in any order: the axes of the file are not those of the specimen
+        # Sorted values are compared, because the file's axes are in another order.
         shown, known = (np.sort(one[one > tree.table.threshold + 1]) for one in (voxels, expected))
         assert shown.size
         np.testing.assert_allclose(shown, known, atol=0.51)

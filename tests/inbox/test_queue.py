@@ -87,14 +87,14 @@ def test_a_restart_goes_on_with_uploads_the_queue_and_the_build(
             client.wait(item, "built")
         client.wait(third, "understood")
         starts = tmp_path / "box" / first / "out" / "starts"
-        assert starts.read_text() == "**"  # interrupted, and gone on with
+        assert starts.read_text() == "**"  # the build was interrupted, and started again
     with serving_inbox(tmp_path) as server:
         client = InboxClient(server.port)
         assert client.ask("GET", f"/items/{first}/view/manifest.json")[1] == "built"
         assert client.item(third)["doing"] == "understood"
 
 
-def test_a_server_that_ends_as_a_build_does_loses_nothing(tmp_path: Path, head: bytes) -> None:
+def test_a_server_that_ends_while_a_build_ends_loses_nothing(tmp_path: Path, head: bytes) -> None:
     with serving_inbox(tmp_path) as server:
         client = InboxClient(server.port)
         item = hand_in(client, "a.nii", head)
@@ -107,7 +107,7 @@ def test_a_server_that_ends_as_a_build_does_loses_nothing(tmp_path: Path, head: 
     assert upload.exists()
     inbox = Inbox(box, LIMITS)
     found = inbox.find(item)
-    assert found.doing == "queued"  # which finds that all is built
+    assert found.doing == "queued"  # the build will find that everything is built
     inbox.set(found, "built")
     assert upload.exists()
     assert Inbox(box, LIMITS).find(item).doing == "built"  # after a power cut at this moment

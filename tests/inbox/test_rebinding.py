@@ -30,7 +30,10 @@ real_look_up = socket.getaddrinfo
 
 
 class NameServer:
-    """An attacker's name server: a public address for the first look-ups, then an inner one."""
+    """An attacker's name server: it gives NAME a public address first, and then a private one.
+
+    public  number of look-ups that get the public address
+    """
 
     def __init__(self, public: int) -> None:
         self.public, self.asked = public, 0
@@ -46,7 +49,7 @@ class NameServer:
 
 @pytest.fixture
 def rebind(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], NameServer]]:
-    """Let a name be public for its first look-ups alone."""
+    """Return a function that gives NAME a public address for the stated number of look-ups."""
 
     def begin(public: int) -> NameServer:
         names = NameServer(public)
@@ -59,7 +62,7 @@ def rebind(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], NameServ
 
 @pytest.fixture
 def inner(tmp_path: Path) -> Iterator[Service]:
-    """A host of the own network, which has images."""
+    """A host in the private network, with images."""
     image = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom())
     with serving_answers() as service:
         service.put("/f.ome.tif", image.read_bytes(), Accept_Ranges="bytes")
@@ -88,7 +91,7 @@ def test_a_reader_for_a_stranger_does_not_ask_an_inner_host(
     assert (inner.asked, names.asked > 0) == ([], True)
 
 
-def test_neither_by_its_number_nor_by_an_answer_that_leads_there(
+def test_a_private_host_is_asked_neither_by_its_ip_address_nor_by_a_name_that_leads_there(
     rebind: Callable[[int], NameServer], inner: Service
 ) -> None:
     rebind(0)
@@ -96,7 +99,7 @@ def test_neither_by_its_number_nor_by_an_answer_that_leads_there(
     for address in (f"{inner.url}/a.zarr", address_of(inner, "a.zarr")):
         with pytest.raises(SourceError):
             read.open(address)
-        client = WebClient([address], shown="a service")  # an own host, which may be private else
+        client = WebClient([address], shown="a service")  # hosts of a service may be private else
         with pytest.raises(SourceError, match="leads into a private network"):
             client.fetch_json(address)
         with pytest.raises(SourceError, match="leads into a private network"):
@@ -108,7 +111,7 @@ def test_neither_by_its_number_nor_by_an_answer_that_leads_there(
 def test_an_address_that_was_public_when_it_was_handed_in_fails_later(
     tmp_path: Path, inner: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The inner number stands for the answer that the process of the reader gets."""
+    """The private IP address stands for the answer of the name server to the reader's process."""
     monkeypatch.setattr(inbox_app, "_is_on_this_machine", lambda _: False)  # from another machine
     monkeypatch.setattr(inbox_module, "check_address", lambda text, **_: text)
     (tmp_path / "served").mkdir()

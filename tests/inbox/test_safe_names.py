@@ -20,7 +20,7 @@ LIMITS = InboxLimits(reserve=0)
 
 
 def arranged(folder: Path, files: dict[str, bytes]) -> Path:
-    """Return the place of the source of an upload of files."""
+    """Upload files and give them neutral names; return the path of the source to read."""
     announced = Announced(tuple(files), tuple(map(len, files.values())))
     upload = Upload.create(folder, announced)
     upload.write(b"".join(files.values()))

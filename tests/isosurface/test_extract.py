@@ -95,7 +95,6 @@ def test_tiles_meet_without_cracks(axis: int, tile_size: tuple[int, int, int]) -
     rng = np.random.default_rng(3)
     voxels = np.zeros((48, 100, 100), np.float32)
     for center in rng.uniform([2, 2, 2], [11, 12, 12], (14, 3)):
-        # Type: ignore[arg-type]
         voxels += 1000 * blurred_ball(voxels.shape, SPACING, tuple(center), 1.6, 0.2)
     voxels += rng.normal(0, 40, voxels.shape)
     region = Box((0, 0, 0), (48, 100, 100))
@@ -106,7 +105,6 @@ def test_tiles_meet_without_cracks(axis: int, tile_size: tuple[int, int, int]) -
     rims = []
     for tile in cut(region, tile_size):
         lattice = tile.lattice(region)
-        # Type: ignore[arg-type]
         mesh = _extract(voxels, lattice.grown(halo, region), lattice, region, 500.0)
         on_plane = np.abs(mesh.positions[:, coordinate]) == plane
         rims.append({row.tobytes() for row in mesh.positions[on_plane]})

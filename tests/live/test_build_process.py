@@ -19,7 +19,7 @@ PATIENCE_S = 120
 
 @pytest.fixture
 def begin(tmp_path: Path) -> Iterator[Callable[[Any], BuildProcess]]:
-    """Begin a build that computes nothing; the process is stopped at the end."""
+    """Return a function that begins a build of support/fake_build.py, which ends after the test."""
     started: list[BuildProcess] = []
 
     def start(build: Any) -> BuildProcess:
@@ -70,7 +70,7 @@ def test_a_build_is_paused_cancelled_and_continued(
 
 
 @pytest.mark.slow
-def test_a_build_that_is_continued_at_once_is_not_failed_by_the_end_of_the_one_before(
+def test_a_build_that_is_continued_after_a_fault_does_not_fail_when_the_failed_process_ends(
     begin: Callable[[Any], BuildProcess], tmp_path: Path
 ) -> None:
     process = begin(fake_build.refused_once)
@@ -83,7 +83,9 @@ def test_a_build_that_is_continued_at_once_is_not_failed_by_the_end_of_the_one_b
 
 
 @pytest.mark.slow
-def test_a_line_is_explained_where_someone_knows_better(tmp_path: Path) -> None:
+def test_the_line_of_a_failed_build_passes_through_the_function_that_explains_it(
+    tmp_path: Path,
+) -> None:
     nothing: Any = SimpleNamespace(tiles=())
     build = partial(fake_build.refused, tmp_path)
     process = BuildProcess(build, tmp_path / "out", lambda line: f"explained: {line}")

@@ -101,7 +101,10 @@ def test_fewer_bytes_show_the_same_picture(tmp_path: Path, monkeypatch: pytest.M
 
 
 def shares(root: Path) -> NDArray[np.float64]:
-    """Return where what shows of a volume lies, as shares of its edges, and its mean brightness."""
+    """Return the centre of a volume's visible voxels, and its mean brightness, 0 to 1.
+
+    The centre is (z, y, x), in shares of the volume's edges, 0 to 1.
+    """
     (entry,) = volumes_of(root)
     file = entry["file"]
     assert isinstance(file, dict)

@@ -102,7 +102,7 @@ def test_windows_and_level_are_near_those_of_a_build(f_tiff: Path, tmp_path: Pat
     assert channel["window"] == pytest.approx([low, high], abs=0.02 * (high - low))
     background, body = float(f_phantom().min()), float(f_phantom().max())
     assert channel["iso_value"] == pytest.approx((background + body) / 2, rel=0.15)
-    # the scale of gradients, by which functions of two dimensions tell edges from tissue
+    # The largest gradient of the joint histogram, by which 2D functions tell edges from tissue
     functions = json.loads((root / channel["transfer_functions_2d"]["file"]["path"]).read_text())
     steepest = statistics.suggested.transfer_2d.gradient_max
     assert functions["gradient_max"] == pytest.approx(steepest, rel=0.02)
@@ -113,7 +113,7 @@ def test_a_large_source_is_read_at_a_coarse_level(
 ) -> None:
     monkeypatch.setattr(coarse_channel, "READ_VOXELS", 20_000)
     fine = f_phantom(2)
-    coarse = np.full((16, 48, 36), 7777, np.uint16)  # unlike the fine one: it shows what was read
+    coarse = np.full((16, 48, 36), 7777, np.uint16)  # its value shows which level was read
     source = write_ome_zarr(
         tmp_path / "large.ome.zarr",
         [fine, coarse],

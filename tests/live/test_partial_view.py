@@ -99,7 +99,7 @@ def test_units_of_an_earlier_build_show_at_once(source: Path, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_a_view_waits_where_the_last_one_took_long_and_the_last_tile_does_not(
+def test_a_view_waits_if_the_one_before_took_long_except_for_that_of_the_last_tile(
     source: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"

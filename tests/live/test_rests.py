@@ -80,7 +80,7 @@ def test_a_rest_ends_by_itself_and_is_followed_by_as_much_work(
     resting.end()
 
 
-def test_a_process_that_has_ended_is_let_alone(busy: psutil.Process) -> None:
+def test_asking_a_process_that_has_ended_to_rest_does_nothing(busy: psutil.Process) -> None:
     resting = Rests(busy.pid)
     (child,) = busy.children()
     child.kill()

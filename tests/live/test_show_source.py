@@ -94,7 +94,7 @@ def test_a_stopped_build_goes_on_behind_the_page_and_a_finished_one_is_shown(
             _, printed = server.communicate(timeout=60)
     assert "showing the finished build in out" in printed
     assert main(["build", str(source), "-o", str(tmp_path / "plain"), *command[-2:]]) == 0
-    # in this process the viewer is a small one, so that the page differs
+    # The build of this process has a small viewer, so the pages differ, and are not compared.
     for part in ("stage", "bundle/channels", "bundle/volumes", "bundle/luts"):
         assert digests_of(tmp_path / "out" / part) == digests_of(tmp_path / "plain" / part)
 
@@ -116,7 +116,7 @@ def test_ctrl_c_while_the_build_starts_prints_no_traceback(tmp_path: Path) -> No
         printed = server.stdout.read()
     assert server.returncode == 0
     assert "Traceback" not in printed
-    assert "stopped" not in printed  # by the user, who knows
+    assert "stopped" not in printed  # the user, who pressed Ctrl+C, need not be informed
 
 
 def test_sources_are_distinguished_from_builds_and_bundles(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def test_a_file_is_sent_whole_or_in_part_as_a_web_host_does(bundle, files):
         ["manifest.json"],
     ],
 )
-def test_nothing_else_is_found(files, path):
+def test_paths_that_are_no_files_of_the_bundle_are_not_found(files, path):
     assert files.answer(path) == (404, b"")
 
 
@@ -63,7 +63,7 @@ def test_a_link_out_of_the_bundle_is_not_followed(bundle, tmp_path):
     assert files.answer(gone.relative_to(tmp_path / "bundle").as_posix()) == (404, b"")
 
 
-def test_the_viewer_s_lights_are_there_where_a_bundle_has_no_page(files, tmp_path, monkeypatch):
+def test_lights_come_from_the_viewer_if_a_bundle_has_no_page(files, tmp_path, monkeypatch):
     (tmp_path / "environments").mkdir()
     (tmp_path / "environments" / "studio.hdr").write_bytes(b"light")
     monkeypatch.setattr("stereocell.notebook.bundle_files.find_page", lambda: tmp_path)

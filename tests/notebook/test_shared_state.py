@@ -36,7 +36,7 @@ def test_valid_values_are_returned_as_plain_numbers():
         ({"CD31": {"window": (1, float("nan"))}}, "two of the source's values"),
     ],
 )
-def test_looks_that_can_t_be_are_refused_in_a_line(channels, message):
+def test_impossible_appearances_of_channels_are_refused_in_a_line(channels, message):
     with pytest.raises(UsageError, match=message):
         check_channels(channels, KNOWN)
 
@@ -58,6 +58,6 @@ def test_looks_that_can_t_be_are_refused_in_a_line(channels, message):
         (check_link, "#" + "v=1" * 4000, "at most 8000"),
     ],
 )
-def test_views_points_and_links_likewise(check, value, message):
+def test_impossible_views_points_and_links_are_refused_in_a_line(check, value, message):
     with pytest.raises(UsageError, match=message):
         check(value)

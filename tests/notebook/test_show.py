@@ -43,7 +43,7 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
     )
     assert viewer.name == "a ball_1"
     assert "24 x 16 x 16 voxels" in viewer.notes
-    assert capsys.readouterr() == ("", "")  # a notebook is no log
+    assert capsys.readouterr() == ("", "")  # nothing is printed into the notebook
 
     def drawn(**looks):
         found = viewer._draw(looks)
@@ -54,7 +54,7 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
     both = drawn()
     assert both.shape[1] == 640
     assert both.max() > 100
-    # as the channels look: another colour, hidden, seen through
+    # The image follows the channels: another colour, hidden, translucent.
     only = drawn(DNA={"color": "#ff0000"}, CD3={"visible": False})
     assert only[..., 0].max() > 2 * only[..., 2].max()
     blue = {"color": "#0000ff"}
@@ -65,11 +65,11 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
     assert through[middle][0] == pytest.approx(0.75 * only[..., 0].max(), rel=0.2)
     assert through[middle][2] > 0.25 * over[middle][2] - 2
     assert drawn(DNA={"visible": False}, CD3={"opacity": 0.0}) is None
-    # shown again from its folder, which stays, with nothing built
+    # The folder of the build can be shown again, without building anything.
     assert stereocell.show(out).name == viewer.name
 
 
-def test_a_build_that_nobody_keeps_goes_when_python_ends(built_page, tmp_path):
+def test_a_build_in_a_temporary_folder_is_removed_when_python_ends(built_page, tmp_path):
     code = BALLS + (
         "from stereocell.bundle import blob_page\n"
         "from stereocell.report import phase; phase.run_report = lambda out: None\n"
@@ -93,7 +93,7 @@ def test_a_build_that_nobody_keeps_goes_when_python_ends(built_page, tmp_path):
 @pytest.mark.parametrize(
     ("source", "more", "message"),
     [
-        ("", {}, "an empty name, expected a path"),  # not the build that one stands in
+        ("", {}, "an empty name, expected a path"),  # does not mean the working folder
         ("x.tif", {"spacing_um": 2}, "spacing_um is 2, expected z, y, x in um"),
     ],
 )
@@ -116,14 +116,14 @@ def test_a_build_without_a_bundle_is_named_as_one(built_page, tmp_path):
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_another_array_takes_the_place_of_a_build_by_force_alone(built_page, tmp_path):
+def test_another_array_replaces_a_build_only_by_force(built_page, tmp_path):
     made: dict = {}
     exec(BALLS, made)
     out = tmp_path / "out"
     sure = {"spacing_um": (0.5, 0.25, 0.25), "out": out}
     stereocell.show(made["small"], **sure)
     before = digests_of(out)
-    stereocell.show(made["small"], **sure)  # the same again is no work
+    stereocell.show(made["small"], **sure)  # the same array again changes nothing
     assert digests_of(out) == before
     for given in (made["ball"], str(make_source(tmp_path / "f.ome.tif"))):
         more = sure if given is made["ball"] else {"out": out}

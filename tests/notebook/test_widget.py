@@ -105,7 +105,7 @@ def published():
     InteractiveShell.clear_instance()
 
 
-def test_its_output_is_the_widget_and_the_picture_below(viewer, published):
+def test_the_output_of_a_viewer_is_the_widget_and_a_picture_below_it(viewer, published):
     viewer._ipython_display_()
     widget, picture = (output["data"] for output in published)
     assert widget["application/vnd.jupyter.widget-view+json"]["model_id"] == viewer.model_id
@@ -116,7 +116,9 @@ def test_its_output_is_the_widget_and_the_picture_below(viewer, published):
     assert published[1]["transient"]["display_id"]
 
 
-def test_a_page_s_picture_takes_its_place_and_the_widget_stays(viewer, published):
+def test_a_picture_that_the_page_sends_replaces_the_first_one_and_the_widget_stays(
+    viewer, published
+):
     viewer._ipython_display_()
     first = viewer._picture
     hear(viewer, {"ask": "picture"}, [memoryview(png("blue"))])

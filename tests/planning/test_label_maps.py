@@ -75,7 +75,7 @@ def test_labels_of_nifti_lie_on_a_dicom_scan(
         z, y, x = np.rint(place / np.array(image.levels[0].spacing_um)).astype(int)
         around = brightness[z - 3 : z + 4, y - 3 : y + 4, x - 3 : x + 4]
         peak = np.array(np.unravel_index(around.argmax(), around.shape)) - 3
-        assert np.abs(peak).max() <= 1  # the middle of the object
+        assert np.abs(peak).max() <= 1  # index from the middle of the object's box
 
 
 def refusal(scan: tuple[Path, Dataset], path: Path) -> str:

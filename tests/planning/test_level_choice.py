@@ -18,7 +18,12 @@ ComponentSums = dict[str, dict[str, int]]
 
 
 def _sums(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> ComponentSums:
-    """Return a level's sums by tile from (voxels, largest, count). All others are specks."""
+    """Return the sums over a level's components, by tile.
+
+    tiles       (voxels, largest, count) of each: voxels above the level, voxels of the largest
+                component, and number of components
+    kept_share  share of the components that are not specks
+    """
     names = ("voxels", "largest", "count", "kept")
     return {
         f"r0_c{i}": dict(zip(names, (*tile, round(kept_share * tile[2])), strict=True))
@@ -28,7 +33,7 @@ def _sums(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> ComponentSum
 
 TISSUE = _sums((1000, 1000, 1), (900, 890, 4))
 CELLS = _sums((100, 10, 40), (90, 9, 50))
-TOUCHING = _sums((100, 60, 40), (90, 20, 50))  # the largest components hold .42
+TOUCHING = _sums((100, 60, 40), (90, 20, 50))  # the largest components hold .42 of the voxels
 # A level that shows the brightest cortex of a whole mouse brain at 25 um
 BRIGHT_PARTS = _sums((249778, 89062, 159), (98724, 94128, 32), kept_share=0.05)
 SPECKS = _sums((4, 2, 2), (5, 2, 3))
@@ -173,7 +178,7 @@ def test_preset_lightsheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Pat
 
 
 def _lit(least: float) -> np.ndarray:
-    """Return balls on a background, both under light that falls along x from 1 to `least`."""
+    """Return balls on a background, both in light that decreases along x from 1 to `least`."""
     shape, rng = (32, 96, 96), np.random.default_rng(6)
     field = np.zeros(shape)
     for place in rng.uniform((20, 12, 12), (140, 180, 180), (30, 3)):

@@ -19,15 +19,15 @@ from support.exhaustive import sweep
 
 SPACING = (1.0, 1.0, 1.0)
 CONSTANT = 100
-LOW, HEIGHT = 100, 1000  # of the ball
-RADIUS_UM, BLUR_UM = 8.0, np.sqrt(2)  # its own 1 um, and as much by the smoothing
-SLICES_AT = (14 + 14 + 21, 14)  # in the picture: margin, title, margin
+LOW, HEIGHT = 100, 1000  # voxel values: the background, and how far the ball rises above it
+RADIUS_UM, BLUR_UM = 8.0, np.sqrt(2)  # sigmas of the ball's own blur and of smoothing are 1 um each
+SLICES_AT = (14 + 14 + 21, 14)  # pixels from the top (margin, title, margin) and from the left
 SCALE = 900 / 32  # pixels a um, in slices
 
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A ball on a level of 100 + 1000 in the left tile of channel 0; channel 1 is constant."""
+    """A ball (1000) on a background (100) in channel 0's left tile; channel 1 is constant."""
     ball = phantoms.blurred_ball((24, 32, 64), SPACING, (12.0, 16.0, 16.0), 8.0, 1.0)
     counts = phantoms.as_counts(ball, 100, 1100, noise=10.0)
     channels = np.stack([counts, np.full_like(counts, CONSTANT)])
@@ -38,7 +38,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def small_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nobody looks at the picture: one of full size takes a second."""
+    """Make small pictures, for tests that don't look at them; one of full size takes a second."""
     monkeypatch.setattr(iso_value, "_LONGEST_PX", 90)
 
 
@@ -87,13 +87,13 @@ def test_the_table_lists_iso_values_with_shares_and_the_flags_that_choose_them(
         kept=["", "--iso-scope tile", "--surfaces 0=300+b"],
     ),
 )
-def test_a_setting_of_the_table_takes_its_level(
+def test_the_setting_in_a_row_of_the_table_chooses_the_level_of_that_row(
     source: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     flags: str,
 ) -> None:
-    """Beside the settings that were given, but for the one that it is instead of."""
+    """The row's setting is added to the given ones, or replaces the one that chose the level."""
     given = flags.split()
     where = ("--channel", "0", "--tile", "r0_c0", "-o", str(tmp_path / "ball.png"))
     assert _iso(source, *where, *given) == 0
@@ -136,7 +136,7 @@ def test_the_legend_has_every_candidate_s_colour_and_nothing_else_is_written(
 
 
 def _radius_um(candidate: Candidate) -> float:
-    """Return where the blurred ball has the candidate's level."""
+    """Return the radius, um, at which the blurred ball has the candidate's level."""
     along = phantoms.blurred_ball((1, 1, 1500), (1, 1, 0.01), (0, 0, 0), RADIUS_UM, float(BLUR_UM))
     return 0.01 * int(np.abs(along[0, 0] - (candidate.raw - LOW) / HEIGHT).argmin())
 
@@ -146,7 +146,7 @@ def test_contours_in_the_slices_lie_where_the_ball_has_their_levels(
     source: Path, tmp_path: Path
 ) -> None:
     """Each candidate's line is a circle, whole, in its own colour, and at its own radius."""
-    # BLUR_UM counts the Gaussian whole, as it acts without a bound
+    # Without a bound on the shift of a value, the Gaussian acts in full, as BLUR_UM assumes.
     flags = {"plan": {"tile_size": [24, 32, 32]}, "surface": {"max_shift": 0.0}}
     settings = load(None, None, flags=flags)
     result, path = preview(
@@ -163,7 +163,7 @@ def test_contours_in_the_slices_lie_where_the_ball_has_their_levels(
         rows, columns = np.nonzero((xy == colors[name]).all(axis=-1))
         down, right = (pixels + 0.5 - 16.5 * SCALE for pixels in (rows, columns))
         away = np.hypot(down, right)
-        # words, the scale bar and the brightest voxels are white too
+        # One of the lines is white. Text, scale bar and brightest voxels are white, too.
         beside = (away > 4 * SCALE) & (away < 11 * SCALE)
         assert beside.any(), name
         assert np.abs(away[beside] - radius * SCALE).max() < 8, name

@@ -43,7 +43,7 @@ SHAPE = (22, 24, 26)
 
 
 def places_lps_mm(about: dict[str, Any]) -> np.ndarray:
-    """LPS of every pixel by the JSON, (slices, rows, columns, 3)."""
+    """Return the LPS coordinates of every pixel, mm, by the JSON, (slices, rows, columns, 3)."""
     count, rows, columns = about["shape"]
     first = np.array([one["first_um"] for one in about["slices"]])
     down, right = np.array(about["step_down_um"]), np.array(about["step_right_um"])
@@ -105,7 +105,7 @@ def test_uneven_images_of_a_tilted_gantry_are_shown_as_they_are_stored(
     headers = [pydicom.dcmread(path).ImagePositionPatient for path in files][::-1]
     assert places_lps_mm(about)[:, 0, 0] == pytest.approx(np.array(headers, float), abs=1e-4)
     across, _ = written(tmp_path / "s", tmp_path / "sides", "--plane", "coronal")
-    assert across["shape"][0] > 30  # of the grid, onto which the tilted slices are moved
+    assert across["shape"][0] > 30  # slices of the grid onto which tilted ones are resampled
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from support.exhaustive import sweep
 from support.nifti_files import write
 
 SHAPE = (22, 24, 26)
-# of the brightest body, by construction: to the left, in front, above the middle
+# Position of the brightest body, LPS in mm: to the left, in front of and above the middle
 left, back, up = BRIGHTEST
 assert left > 5
 assert back < -5
@@ -32,7 +32,7 @@ ITS_SIDES = set("LAS")
 
 
 def require_upright(view: View, voxels: np.ndarray) -> None:
-    """Hold the brightest body to the sides that the letters say."""
+    """Assert that the brightest body lies towards the edges of the picture that name its sides."""
     seen = view.plane(voxels.max(axis=view.order[0]).transpose(_kept(view)))
     row, column = np.unravel_index(int(seen.argmax()), seen.shape)
     at_left, at_right, at_top, at_bottom = view.ends
@@ -43,13 +43,13 @@ def require_upright(view: View, voxels: np.ndarray) -> None:
 
 
 def _kept(view: View) -> tuple[int, int]:
-    """Rows and columns among the two axes that are left once the third is gone."""
+    """Return the axes of rows and of columns in a projection, which lacks the view's third axis."""
     axis, down, right = view.order
     return down - (down > axis), right - (right > axis)
 
 
 @pytest.mark.parametrize(("order", "signs"), ORIENTATIONS)
-def test_nifti_of_every_orientation(
+def test_pictures_of_nifti_of_every_orientation_are_upright(
     tmp_path: Path, order: tuple[int, ...], signs: tuple[int, ...]
 ) -> None:
     affine = oriented(order, signs, SHAPE)
@@ -61,7 +61,7 @@ def test_nifti_of_every_orientation(
 
 
 @pytest.mark.parametrize(("order", "signs"), sweep(ORIENTATIONS, kept=FEW_ORIENTATIONS))
-def test_dicom_of_every_orientation(
+def test_pictures_of_dicom_of_every_orientation_are_upright(
     tmp_path: Path, order: tuple[int, ...], signs: tuple[int, ...]
 ) -> None:
     write_series(tmp_path / "s", oriented(order, signs, SHAPE), SHAPE)

@@ -131,7 +131,7 @@ def test_a_killed_run_goes_on(
         ),
     ],
 )
-def test_a_list_that_is_none_removes_nothing(
+def test_a_damaged_list_of_published_files_removes_nothing(
     out: Path, run: Run, tmp_path: Path, content: bytes, words: str
 ) -> None:
     site = tmp_path / "site"
@@ -145,7 +145,7 @@ def test_a_list_that_is_none_removes_nothing(
     assert below(site) == {LIST: content}
 
 
-def test_a_link_in_the_target_leads_nowhere_else(out: Path, run: Run, tmp_path: Path) -> None:
+def test_links_in_the_target_are_not_followed(out: Path, run: Run, tmp_path: Path) -> None:
     site, other = tmp_path / "site", tmp_path / "other"
     site.mkdir()
     other.mkdir()
@@ -165,7 +165,7 @@ def test_a_damaged_bundle_is_not_published(out: Path, run: Run, tmp_path: Path) 
     assert run(tmp_path / "nothing", tmp_path / "site")[0] == 1
 
 
-def test_a_place_in_out_or_a_plain_host_is_refused(out: Path, run: Run) -> None:
+def test_a_target_inside_out_or_on_a_web_host_is_refused(out: Path, run: Run) -> None:
     assert "inside OUT" in run(out, out / "bundle" / "x")[2]
     assert "files can't be written over http" in run(out, "https://me.example/x")[2]
     assert run(out, "nowhere://x/y")[0] == 1
@@ -202,7 +202,7 @@ def test_every_file_is_fetched_as_browsers_do(
     url = f"{host}/my%20specimen"
     code, done, printed = run(out, site, "--url", url)
     assert (code, done["address"]) == (0, f"{url}/"), printed
-    (site / "volumes/r0_c0.ktx2").write_bytes(bytes(256 * 40))  # of the same size
+    (site / "volumes/r0_c0.ktx2").write_bytes(bytes(256 * 40))  # other bytes of the same number
     code, _, printed = run(out, site, "--url", url)
     assert code == 1
     assert f"{url}/volumes/r0_c0.ktx2: found different bytes" in printed

@@ -18,13 +18,13 @@ Run = Callable[..., tuple[int, dict[str, Any], str]]
 
 @pytest.fixture
 def bundle(out: Path, tmp_path: Path) -> Path:
-    """A bundle that lies by itself, outside of the build that it was made by."""
+    """A copy of the bundle outside of the build that made it."""
     return shutil.copytree(out / "bundle", tmp_path / "a bundle")
 
 
 @pytest.fixture
 def site(bundle: Path, run: Run, tmp_path: Path) -> Path:
-    """The page of the bundle."""
+    """The folder into which the bundle has been published."""
     assert run(bundle, tmp_path / "site")[0] == 0
     return tmp_path / "site"
 
@@ -61,7 +61,7 @@ def test_file_of_a_page_that_was_edited_stays_without_force(
     if has_new_bundle:
         write(out, {"index.html": b"<!doctype html>new"})
     there = below(site)
-    for _ in range(2):  # a run that was refused changes no later one
+    for _ in range(2):  # a refused run does not change the outcome of a later one
         code, _, printed = run(out / "bundle", site)
         assert code == 1
         assert "index.html: " in printed
@@ -102,7 +102,7 @@ def test_a_file_that_is_damaged_on_its_way_is_uploaded_again(
 
 
 def _raise_bounds(place: Path) -> None:
-    """Change one digit of a number, which the schema of the manifest can't tell."""
+    """Change one digit of a number in the manifest, which its schema can't notice."""
     file = place / "manifest.json"
     text = file.read_text("utf-8")
     file.write_text(text.replace('"max": [\n    1', '"max": [\n    9'))

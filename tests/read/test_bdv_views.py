@@ -29,7 +29,10 @@ def write(
     unit: str = "micrometer",
     kind: str = "hdf5",
 ) -> Path:
-    """Write a container and its XML; a setup has `body`, `affines` and attributes."""
+    """Write a container and its XML, and return the XML's path.
+
+    setups  for each: `body` (z, y, x), and optionally `affines`, `name`, `size` and ATTRIBUTES
+    """
     folder.mkdir(exist_ok=True)
     name = "a.h5" if kind == "hdf5" else "a.n5"
     views, placed = "", ""

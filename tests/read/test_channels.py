@@ -51,7 +51,7 @@ def test_missing_names_matter_only_where_channels_are_named(
     assert [channel.color for channel in dataset.channels] == [None, None]
     assert not any(channel.is_named for channel in dataset.channels)
     assert dataset.find_channels(["1"]) == (1,)
-    # the made-up names that the product shows
+    # The names that the product makes up for channels without a name can be used, too.
     assert dataset.find_channels(["Channel1", "Channel0"]) == (1, 0)
     expected = "no channel names, expected Channel0 to Channel1, or an index from 0 to 1"
     with pytest.raises(UsageError, match=expected):

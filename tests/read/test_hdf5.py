@@ -224,7 +224,10 @@ U16 = bytes.fromhex("1000000002000000 00001000")
 
 
 def damage(path: Path, part: bytes, offset: int, value: int) -> None:
-    """Set a byte in the only place of a file that holds `part`."""
+    """Set one byte of a file, `offset` bytes behind the beginning of `part`.
+
+    The file contains `part` exactly once.
+    """
     content = bytearray(path.read_bytes())
     assert content.count(part) == 1
     content[content.index(part) + offset] = value

@@ -52,7 +52,7 @@ def test_a_stated_spacing_stays_if_the_shape_gives_no_whole_factor() -> None:
 
 
 def rename(path: Path, names: Any, version: str) -> Path:
-    """Write the level again with names for its dimensions."""
+    """Write BODY again as the array of level 0, with names for its dimensions."""
     named: Any = {"dimension_names": names} if version == "0.5" else {}
     zarr_format: Any = 3 if version == "0.5" else 2
     array = zarr.create_array(

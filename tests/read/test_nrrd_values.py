@@ -28,7 +28,7 @@ def write(path: Path, constants: list[float], kind: str, axis: int, **fields: An
 
 
 def levels(path: Path) -> list[int]:
-    """Return the constant of each time point."""
+    """Return the constant of each time point's image, which is its smallest voxel."""
     found = []
     for time in range(read.open(path).time_points):
         dataset = read.open(path, time=time)

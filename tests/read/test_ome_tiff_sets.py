@@ -30,7 +30,14 @@ def uuid(number: int) -> str:
 
 
 def block(z: int, name: str = "", number: int = 0, ifd: int = 0, count: int = 8) -> TiffData:
-    """Return the entry of `count` planes from z on: pages of a file, from `ifd` on."""
+    """Return the entry of OME-XML that assigns pages of a file to planes.
+
+    z       the first plane
+    name    file name; "": the file that holds the OME-XML
+    number  number of the UUID of the named file
+    ifd     the first page
+    count   number of planes and pages
+    """
     stated = TiffData.UUID(value=uuid(number), file_name=name) if name else None
     return TiffData(first_z=z, ifd=ifd, plane_count=count, uuid=stated)
 
@@ -49,7 +56,10 @@ def image(number: int, blocks: Sequence[TiffData]) -> Image:
 
 
 def described(blocks: Sequence[TiffData], own: int | None = None, more: Any = ()) -> str:
-    """Return the OME-XML of a file whose own UUID has this number; None: it states none."""
+    """Return OME-XML with these entries.
+
+    own  number of the UUID that the file states as its own; None: it states none
+    """
     root = OME(uuid=uuid(own) if own is not None else None, images=[image(0, blocks), *more])
     return str(root.to_xml())
 
@@ -66,7 +76,7 @@ def write_set(
 ) -> None:
     """Write the two halves of the phantom, which the OME-XML names by two UUIDs from `first` on.
 
-    stated  UUID that each file states
+    stated  number of the UUID that each file states as its own; None: it states none
     names   names of the files on the disk
     """
     folder.mkdir(exist_ok=True)

@@ -23,7 +23,7 @@ FORMATS = ("tiny_zarr_04", "tiny_zarr_05", "tiny_tiff")
 
 
 def in_order(czyx: NDArray[Any], axes: str) -> NDArray[Any]:
-    """Move (c, z, y, x) into another order of axes; `t` becomes an axis of length 1."""
+    """Return an array (c, z, y, x) with its axes in another order; `t` is an axis of length 1."""
     return np.moveaxis(czyx[None], range(5), ["tczyx".index(a) for a in "tczyx"]).transpose(
         ["tczyx".index(axis) for axis in axes]
     )

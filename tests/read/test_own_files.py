@@ -30,7 +30,10 @@ refusal = refusing(read_levels)
 
 
 def tiff_of(path: Path, name: str, written: Callable[[str], str] = str) -> Path:
-    """Write an OME-TIFF whose planes lie in another file; `written` changes its OME-XML."""
+    """Write an OME-TIFF whose OME-XML says that the planes lie in the file `name`.
+
+    written  changes the OME-XML
+    """
     planes = f'<TiffData IFD="0" PlaneCount="4"><UUID FileName="{name}">{_ID.format(1)}</UUID>'
     text = xml(inside=f"{planes}</TiffData>").replace("<OME ", f'<OME UUID="{_ID.format(2)}" ')
     path.parent.mkdir(exist_ok=True)

@@ -60,7 +60,11 @@ NONE = 0  # the stream has no checksum: a flipped byte gives other voxels, or th
 
 
 class Row(NamedTuple):
-    """A compressed format, and the distance of its checksum from the stream's end in bytes."""
+    """A compressed format.
+
+    write        writes a file, and returns its packed stream
+    checksum_at  bytes from the checksum's beginning to the stream's end; NONE: no checksum
+    """
 
     write: Callable[[Path], Stream]
     checksum_at: int

@@ -22,7 +22,10 @@ GDAL = (
 
 
 def write_planes(folder: Path, **of_half: Any) -> Path:
-    """Write BODY plane by plane like ImageJ; the second half has other metadata or resolution."""
+    """Write each plane of BODY into a TIFF file, like ImageJ.
+
+    of_half  options of tifffile for the second half of the planes, such as another resolution
+    """
     folder.mkdir(exist_ok=True)
     for z, plane in enumerate(BODY):
         options: dict[str, Any] = {"resolution": (4.0, 5.0), "metadata": {"unit": "um"}}

@@ -46,7 +46,7 @@ def fill(folder: Path, names: dict[str, NDArray[Any]], write: Write = tiff) -> P
 
 
 def read_all(dataset: read.Dataset) -> NDArray[Any]:
-    """Return all channels, (c, z, y, x)."""
+    """Return the voxels of all channels at the finest level, (c, z, y, x)."""
     box = dataset.levels[0].box
     return np.stack([dataset.read(c, box).voxels for c in range(len(dataset.channels))])
 

@@ -44,7 +44,7 @@ def refusal(source: Path | str, **options: Any) -> str:
 
 
 def hold_voxels(dataset: read.Dataset, stored: NDArray[Any], axes: str) -> None:
-    """Compare all channels with an array whose axes are named."""
+    """Assert that all channels of a dataset equal an array whose axes are these letters."""
     found = dict(zip(axes, range(len(axes)), strict=True))
     for channel in range(len(dataset.channels)):
         key: list[Any] = [slice(None)] * len(axes)

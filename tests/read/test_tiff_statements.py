@@ -29,7 +29,14 @@ def write_ome(
     path: Path, voxels: Any, *, sizes: dict[str, int] | None = None, depth: str = "0.5",
     planes: str = "", after: str = "", inside: str = "", **options: Any,
 ) -> Path:  # fmt: skip
-    """Write planes, one after another, as an image of these sizes (z by default)."""
+    """Write planes (n, y, x) as an OME-TIFF.
+
+    sizes   number of planes along Z, C and T; by default all lie along Z
+    depth   PhysicalSizeZ, um; "": not stated
+    planes  elements inside of Pixels
+    inside  elements inside of Image, after Pixels
+    after   elements after Image
+    """
     count, y, x = voxels.shape
     held = {"Z": count, "C": 1, "T": 1} | (sizes or {})
     z_size = f'PhysicalSizeZ="{depth}"' if depth else ""
@@ -57,7 +64,7 @@ def places(values: Any, unit: str = "\u00b5m", times: Any = None) -> str:
 
 
 def upright(stored: Any, orientation: int) -> Any:
-    """Return the planes as libtiff draws them, by the wording of TIFF 6.0 for tag 274."""
+    """Return stored planes (z, row, column) turned as TIFF 6.0 states for tag 274, Orientation."""
     row = {1: "t", 2: "t", 3: "b", 4: "b", 5: "l", 6: "r", 7: "r", 8: "l"}[orientation]
     column = {1: "l", 2: "r", 3: "r", 4: "l", 5: "t", 6: "t", 7: "b", 8: "b"}[orientation]
     seen = stored

@@ -18,7 +18,7 @@ from stereocell.read import unmeasured
 from support.phantoms import write_ome_tiff, write_ome_zarr
 
 VOXELS = np.random.default_rng(0).normal(100, 20, (2, 12, 40, 36)).astype(np.float32)
-LOWEST = (-3.5, 7.25)  # of the two channels, in one voxel each
+LOWEST = (-3.5, 7.25)  # smallest value of each of the two channels; one voxel has it
 
 
 def with_gaps() -> NDArray[np.float32]:

@@ -61,9 +61,7 @@ def lods() -> tuple[Lod, ...]:
 def test_level_with_maps_looks_like_the_finest(
     lods: tuple[Lod, ...], level: int, least: float
 ) -> None:
-    """The mean over five views is .95 or more, of a single one at lod2 .953 here; maps take a fifth
-    or more of what is unlike.
-    """
+    """The mean SSIM of five views is .95 or more. Maps reduce 1 - SSIM by a fifth or more."""
     coarse = lods[level]
     assert len(coarse.mesh.triangles) < 0.6 * len(lods[0].mesh.triangles)
     found = find_likeness(lods[0], coarse)
@@ -77,7 +75,7 @@ def test_level_with_maps_looks_like_the_finest(
 @pytest.mark.slow
 @pytest.mark.parametrize("stain", sweep(range(len(STAINS)), kept=[1]))
 def test_coarsest_level_has_the_finest_s_outlines(stain: int) -> None:
-    """SSIM of the outlines, close up, is .9 or more at each view: nuclei, membranes, vessels."""
+    """The SSIM of the outlines from near is .9 or more for nuclei, membranes and vessels."""
     box = Box((0, 0, 0), (48, 96, 96))
     depth, height, width = (n * h for n, h in zip(box.shape, SPACING_UM, strict=True))
     tissue = grow_tissue((depth, height, width), 0, 1.0)

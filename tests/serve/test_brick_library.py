@@ -63,7 +63,7 @@ def test_threshold_is_the_largest_value_that_a_function_leaves_invisible():
 
 @pytest.mark.parametrize(("chosen", "threshold"), [("default", 99), ("sharp", 199), ("soft", -1)])
 def test_trees_use_the_function_that_the_stage_opens_with(out, chosen, threshold):
-    """`soft` shows everything: no reason to send what is dark to one who looks at `sharp`."""
+    """A function that hides dark values, like `sharp`, needs no brick of them; `soft` needs all."""
     opacities = np.zeros((3, 256))
     opacities[0, 100:] = opacities[1, 200:] = opacities[2] = 0.5
     names = ["default", "sharp", "soft"]
@@ -107,7 +107,7 @@ def test_a_damaged_tree_is_built_again(out, spoil):
     elif spoil == "brick":
         data[-1] ^= 1
     elif spoil == "other":
-        data[48] ^= 1  # says that it is of another volume
+        data[48] ^= 1  # the tree's file then states the hash of another volume
     path.write_bytes(b"" if spoil == "empty" else data)
     again = library(out)
     assert again.open("r0_c0", "CD31").table_hash == before

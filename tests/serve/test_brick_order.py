@@ -13,7 +13,7 @@ IDENTITY = np.eye(4).ravel().tolist()
 
 
 def noise(shape=(66, 66, 66)):
-    """Return a volume whose bricks all err alike: noise on a sheet of 200."""
+    """Return a volume of noise round 200, whose bricks all have similar errors."""
     return np.random.default_rng(3).integers(150, 250, shape).astype(np.uint8)
 
 
@@ -53,7 +53,7 @@ def test_everything_in_sight_is_wanted_to_the_leaves():
     assert (TREE.level == 0).sum() == 5**3
 
 
-def test_nodes_of_apron_alone_never_come_even_with_everything_in_sight():
+def test_nodes_that_hold_only_apron_are_never_wanted_even_if_everything_is_in_sight():
     """49 texels along x: the fourth cell begins at 48, and what is drawn ends at 47.5."""
     volume = noise((34, 34, 49))
     tree = placed(volume)
@@ -87,7 +87,7 @@ def test_parents_come_before_their_children():
 
 
 def test_the_nearer_of_two_equal_bricks_comes_first():
-    """Along the line of sight: two bricks of the same level, the same parent's error."""
+    """All bricks have similar errors, so of one level the nearest ones to the eye come first."""
     _, nodes, _ = order(view((31.5, 31.5, 90.0), MIDDLE), [TREE])
     level1 = [n for n in nodes.tolist() if TREE.level[n] == 1]
     depth = TREE.center[level1][:, 2]
@@ -118,7 +118,7 @@ def test_the_brick_with_the_larger_error_comes_first():
 
 
 def test_nothing_outside_the_frustum_is_wanted():
-    """Against the corners of the boxes: none of a wanted box's corners may be behind one plane."""
+    """A box is wanted unless all of its corners lie outside of one plane of the frustum."""
     camera = view((31.5, 31.5, 100.0), (60.0, 50.0, 31.5), fov_y=np.radians(12))
     _, nodes, _ = order(camera, [TREE])
     corners = np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(-1, 3)
@@ -132,7 +132,7 @@ def test_nothing_outside_the_frustum_is_wanted():
         assert (node in found) == (not outside)
 
 
-def test_behind_the_eye_there_is_nothing():
+def test_no_brick_behind_the_eye_is_wanted():
     _, nodes, _ = order(view((31.5, 31.5, 100.0), (31.5, 31.5, 200.0)), [TREE])
     assert len(nodes) == 0
 
@@ -157,7 +157,7 @@ def test_refinement_ends_where_the_error_is_small_enough():
 
 
 def test_a_moved_tile_is_looked_at_where_it_is():
-    """Turned by 90 degrees about y and moved: the same picture from an eye moved with it."""
+    """The tile is turned by 90 degrees about y and moved. An eye moved with it wants the same."""
     turn = np.array([[0, 0, 1, 1000.0], [0, 1, 0, -50], [-1, 0, 0, 7], [0, 0, 0, 1]])
     moved = placed(noise(), matrix=turn.T.ravel().tolist())
 
@@ -177,7 +177,7 @@ def test_trees_are_merged_by_worth():
     tree, nodes, worth = order(camera, [far, near])
     assert set(tree.tolist()) == {0, 1}
     assert (np.diff(worth) <= 0).all()
-    assert (tree[0], nodes[0]) == (1, 0)  # the root of the nearer
+    assert (tree[0], nodes[0]) == (1, 0)  # the root of the nearer tree
     assert {(0, 0), (1, 0)} <= set(zip(tree[:12].tolist(), nodes[:12].tolist(), strict=True))
 
 

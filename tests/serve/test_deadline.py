@@ -48,8 +48,11 @@ def encrypted(server: BundleServer) -> socket.socket:
 
 
 def seconds_until_closed(stream: socket.socket, drip: bytes = b"", first: bytes = b"") -> float:
-    """Send `first` and read its answer, then a byte of `drip` every 50 ms; return how long it
-    takes after that until the server closes."""
+    """Return the seconds from now, or from the answer to `first`, until the server closes.
+
+    first  request that is sent and answered before the time begins; empty: none
+    drip   bytes that are sent meanwhile, one every 50 ms
+    """
     if first:
         stream.sendall(first)
         answer = b""
@@ -80,7 +83,7 @@ def live_connections(server: BundleServer) -> int:
 
 
 def await_connections(server: BundleServer, count: int) -> None:
-    """The server hears of a close a little after the client: wait for it."""
+    """Wait until the server counts this many connections; it notices a close with a delay."""
     end = time.monotonic() + 10
     while live_connections(server) != count:
         assert time.monotonic() < end, f"{live_connections(server)} connections, not {count}"

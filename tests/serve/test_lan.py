@@ -31,7 +31,7 @@ from support.server.timeouts import PATIENCE_S, connect
 
 
 def certificate(port):
-    """Return what the server shows, and its SHA-256 as the terminal writes it."""
+    """Return the server's certificate (PEM), and its SHA-256 in the form of the terminal."""
     pem = ssl.get_server_certificate(("127.0.0.1", port))
     digest = hashlib.sha256(ssl.PEM_cert_to_DER_cert(pem)).hexdigest().upper()
     return pem, ":".join(re.findall("..", digest))
@@ -50,7 +50,7 @@ def server(tmp_path, monkeypatch):
 
 @pytest.fixture
 def context():
-    """Trust as a person gives it who went on: any certificate, encrypted."""
+    """TLS that accepts any certificate, like a browser whose user went on after its warning."""
     found = ssl.create_default_context()
     found.check_hostname = False
     found.verify_mode = ssl.CERT_NONE
@@ -73,7 +73,7 @@ def ask(server, context, path, method="GET", host=None, cookie=None):
 
 
 def enter(server, context):
-    """Return the cookie that a fresh token gives."""
+    """Use the server's present token; return the session's cookie."""
     response, _ = ask(server, context, f"/?token={server.gate.token}")
     assert response.status == 303
     return response.headers["Set-Cookie"].split(";")[0]
@@ -162,7 +162,7 @@ def test_the_fingerprint_is_that_of_the_certificate(server):
     assert certificate(server.port)[1] == server.fingerprint
 
 
-def test_a_certificate_is_good_for_the_servers_names_alone(server):
+def test_a_certificate_is_valid_only_for_the_servers_names(server):
     found = x509.load_pem_x509_certificate(certificate(server.port)[0].encode())
     names = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     listed = {str(name.value).lower() for name in names}
@@ -171,7 +171,7 @@ def test_a_certificate_is_good_for_the_servers_names_alone(server):
     assert not found.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
 
 
-def test_a_host_name_that_no_certificate_takes_is_left_out(monkeypatch):
+def test_a_host_name_that_a_certificate_can_not_hold_is_left_out(monkeypatch):
     monkeypatch.setattr("socket.gethostname", lambda: "my_host")
     names = find_names(["192.168.7.9"])
     assert "my_host" in names
@@ -186,7 +186,7 @@ def test_every_run_has_a_key_of_its_own():
     assert make_certificate(names)[1] != fingerprint
 
 
-def test_nothing_that_is_written_tells_a_token_but_the_code(server, context, capfd):
+def test_only_the_qr_code_in_the_output_reveals_a_token(server, context, capfd):
     token = server.gate.token
     enter(server, context)
     ask(server, context, f"/?token={token}")
@@ -215,8 +215,8 @@ def test_the_terminal_explains_which_certificate_to_accept_and_why(server, capfd
         assert words in printed
 
 
-def test_the_code_says_the_address():
-    """Half blocks, two rows a line, light modules drawn: against the matrix of the standard."""
+def test_the_qr_code_contains_the_address():
+    """The modules are compared with segno's. A line of half blocks has two rows; light is drawn."""
     address = "https://192.168.7.9:8000/?token=" + "x" * 43
     dark = [list(row) for row in segno.make(address, error="l", micro=False).matrix_iter(border=2)]
     halves = {"█": (0, 0), "▀": (0, 1), "▄": (1, 0), " ": (1, 1)}
@@ -228,7 +228,7 @@ def test_the_code_says_the_address():
     assert [list(row) for row in rows[: len(dark)]] == dark
 
 
-def test_the_code_is_drawn_without_blocks_where_the_terminal_has_none():
+def test_the_qr_code_is_drawn_by_spaces_if_the_terminal_has_no_blocks():
     address = "https://192.168.7.9:8000/?token=" + "x" * 43
     dark = [list(row) for row in segno.make(address, error="l", micro=False).matrix_iter(border=2)]
     text = draw_qr(address, encoding="latin-1")

@@ -154,7 +154,7 @@ def test_a_large_tile_is_read_as_finely_as_there_is_room_for(
     monkeypatch.setattr(fine_tiles, "PLANNED_VOXELS", 50_000)
     monkeypatch.setattr(fine_tiles, "COARSER_VOXELS", 30_000)
     monkeypatch.setattr(coarse_channel, "READ_VOXELS", 40_000)
-    coarse = np.full((16, 48, 36), 7777, np.uint16)  # unlike the fine one: it shows what was read
+    coarse = np.full((16, 48, 36), 7777, np.uint16)  # its value shows which level was read
     coarse[::2] = 7000
     source = write_ome_zarr(
         tmp_path / "large.ome.zarr",

@@ -181,7 +181,7 @@ def test_every_malformed_message_is_closed_with_a_reason_or_ignored(port, capfd,
 
 
 def handshake():
-    """Return what a client begins with."""
+    """Return the request by which a client opens a websocket."""
     key = base64.b64encode(os.urandom(16))
     return (
         b"GET /bricks HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -191,7 +191,7 @@ def handshake():
 
 @contextmanager
 def raw_stream(port):
-    """Yield a socket on which frames are next."""
+    """Yield a socket after the handshake of a websocket, so that frames come next."""
     with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as stream:
         stream.sendall(handshake())
         answer = b""

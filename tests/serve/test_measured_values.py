@@ -82,7 +82,7 @@ def test_a_place_outside_the_volume_has_no_value(out: Path) -> None:
 
 
 @pytest.mark.parametrize("at", ["", "1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", "1," * 200])
-def test_a_place_that_is_none_is_refused(out: Path, at: str) -> None:
+def test_a_malformed_position_is_refused(out: Path, at: str) -> None:
     assert parse_place(at) is None
     with serving(out) as server:
         port = server.port
@@ -91,7 +91,7 @@ def test_a_place_that_is_none_is_refused(out: Path, at: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_stage_that_is_not_the_bundle_s_any_more_tells_nothing(out: Path, tmp_path: Path) -> None:
+def test_a_stage_that_differs_from_the_bundle_s_gives_no_values(out: Path, tmp_path: Path) -> None:
     at = at_voxel(3, 4, 5)
     other = build(tmp_path, "--window", "F=-500:0")
     with serving(other) as server:
@@ -104,7 +104,7 @@ def test_a_stage_that_is_not_the_bundle_s_any_more_tells_nothing(out: Path, tmp_
         assert value(port, "r0_c0/F", at) is None
 
 
-def test_without_a_stage_there_is_nothing_to_ask(out: Path, tmp_path: Path) -> None:
+def test_a_bundle_without_a_stage_offers_no_values(out: Path, tmp_path: Path) -> None:
     with serving(shutil.copytree(out / "bundle", tmp_path / "alone")) as server:
         port = server.port
         response, _ = ask(port, "/manifest.json")

@@ -1,7 +1,8 @@
-"""Parts of uvicorn and websockets that they promise to nobody, and the server builds on.
+"""Parts of uvicorn and websockets on which the server relies although they are not public API.
 
-pyproject.toml holds both to the versions that have them. Where a newer one is allowed in, this
-names what it changed; the attacks of serve/test_attacks.py then tell whether the server holds.
+pyproject.toml pins both packages to versions that have these parts. After an update, these tests
+name the parts that changed, and serve/test_attacks.py shows whether the server still withstands
+attacks.
 """
 
 import ast

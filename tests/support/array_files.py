@@ -17,7 +17,7 @@ from pylibCZIrw import czi
 
 from support.phantoms import f_phantom
 
-SIZE_UM = (0.5, 0.2, 0.25)  # z, y, x
+SIZE_UM = (0.5, 0.2, 0.25)  # voxel spacing (z, y, x)
 BLOCK = (16, 12, 8)  # voxels of an N5 block (x, y, z)
 
 
@@ -27,7 +27,10 @@ def characters(text: str) -> NDArray[Any]:
 
 
 def write_ims(path: Path, czyx: NDArray[Any], unit: str = "um", pad: int = 5) -> Path:
-    """Write two levels and two time points, each dataset padded by `pad` voxels."""
+    """Write an Imaris file of two resolution levels and two time points.
+
+    pad  number of voxels of 0 that are added at the end of each axis of every dataset
+    """
     with h5py.File(path, "w") as file:
         info = file.create_group("DataSetInfo/Image")
         info.attrs["Unit"] = characters(unit)
@@ -88,7 +91,7 @@ def write_lif(
 ) -> Path:
     """Write images, each with its axes, slowest first (`TCZYX` or a part in any order).
 
-    unit      of the lengths, whose numbers are those in m
+    unit      stated unit of the lengths; their numbers are always those in metres
     recorded  values of the scanner's records, by their identifiers
     """
     records = "".join(
@@ -160,7 +163,7 @@ def write_n5(
 
 
 def write_bdv_xml(folder: Path, container: str, unit: str) -> None:
-    """Write BigDataViewer's XML of two setups, of SIZE_UM where the unit is the nanometre."""
+    """Write BigDataViewer's XML of two setups. With the unit nm, their voxel size is SIZE_UM."""
     setups = "".join(
         f"<ViewSetup><id>{i}</id><name>{name}</name><voxelSize><unit>{unit}</unit>"
         "<size>250 200 500</size></voxelSize></ViewSetup>"
@@ -174,5 +177,5 @@ def write_bdv_xml(folder: Path, container: str, unit: str) -> None:
 
 
 def five(body: NDArray[Any]) -> NDArray[Any]:
-    """Return (t, c, z, y, x) with 2 times and 2 channels of a body, all different."""
+    """Return (t, c, z, y, x): 2 time points and 2 channels of a body, each with other values."""
     return np.stack([np.stack([body + 10 * t + c for c in (0, 1)]) for t in (0, 1)])

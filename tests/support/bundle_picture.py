@@ -36,7 +36,7 @@ def read_table(file: Path, row: int) -> NDArray[np.float64]:
 
 
 def read_blocks(bundle: Path, names: list[str]) -> list[Block]:
-    """Return all tiles of these channels at their finest level."""
+    """Return all tiles of these channels at their finest resolution level."""
     manifest = json.loads((bundle / "manifest.json").read_text("utf-8"))
     channels = [next(c for c in manifest["channels"] if c["id"] == name) for name in names]
     tables, tiles = [], []
@@ -63,7 +63,7 @@ def read_blocks(bundle: Path, names: list[str]) -> list[Block]:
 
 
 def main(bundle: Path, picture: Path) -> None:
-    """Print the PSNR of the picture."""
+    """Print as JSON the PSNR of the picture of the viewer."""
     asked = json.load(sys.stdin)
     found = np.asarray(Image.open(picture).convert("RGB"))
     height, width = found.shape[:2]

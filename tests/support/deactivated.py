@@ -1,4 +1,4 @@
-"""Layers over the stage of support/stages.py that deactivate a part of it."""
+"""Layers over the stage of support/stages.py that deactivate one of its prims, such as a tile."""
 
 from pathlib import Path
 

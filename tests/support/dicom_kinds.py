@@ -53,5 +53,8 @@ def write_kind(
 
 
 def added(folder: Path, series: int = 0, time: int = 0) -> float:
-    """Return the constant that the read volume has above the scene, which is 0 at its edge."""
+    """Return the constant by which the voxels that are read exceed the scene.
+
+    The scene is 0 at its edge, so the constant is the smallest voxel.
+    """
     return float(whole(read.open(folder, series=series, time=time)).min())

@@ -47,7 +47,7 @@ def write_mosaic(
     for k, plane in enumerate(voxels):
         row, column = divmod(k, side)
         pixels[row * rows : (row + 1) * rows, column * columns : (column + 1) * columns] = plane
-    corner = affine.copy()  # places the mosaic as if it were one slice with the same middle
+    corner = affine.copy()  # position of the mosaic, as if it were a slice with the first's middle
     corner[:3, 3] -= (
         affine[:3, 1] * (side - 1) * rows / 2 + affine[:3, 2] * (side - 1) * columns / 2
     )

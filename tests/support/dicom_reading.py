@@ -10,7 +10,7 @@ from support.reading import whole
 
 
 def lps_mm(dataset: Dataset) -> NDArray[np.float64]:
-    """LPS of every voxel: world is (L, S, -P), in um."""
+    """Return LPS coordinates of every voxel, mm, (z, y, x, 3). World axes are (L, S, -P), um."""
     level = dataset.levels[0]
     index = np.stack(np.meshgrid(*map(np.arange, level.shape), indexing="ij"), axis=-1)
     move = np.array(dataset.placement)
@@ -19,10 +19,16 @@ def lps_mm(dataset: Dataset) -> NDArray[np.float64]:
 
 
 def error(dataset: Dataset) -> float:
-    """Return the largest difference from the scene, whose grey values reach about 1000."""
+    """Return the largest difference of a voxel from the scene at its position.
+
+    Values of the scene reach about 1000.
+    """
     return float(np.abs(whole(dataset) - scene(lps_mm(dataset))).max())
 
 
 def interpolation_bound(gap_mm: float) -> float:
-    """How far a straight line over a gap strays from the scene: h^2 / 8 times its curvature."""
+    """Return the largest error of linear interpolation of the scene over a gap.
+
+    It is h^2 / 8 times the largest curvature, and 1 for rounding.
+    """
     return gap_mm**2 / 8 * max(height / sigma**2 for _, sigma, height in BODIES) + 1.0

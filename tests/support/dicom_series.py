@@ -45,7 +45,7 @@ _ENHANCED = {"MR": EnhancedMRImageStorage, "CT": EnhancedCTImageStorage}
 
 
 def scene(lps_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the brightness at points (..., 3): blobs, 0 far away from them."""
+    """Return the brightness at points (..., 3), LPS mm: Gaussian blobs, 0 far away from them."""
     total = np.zeros(lps_mm.shape[:-1])
     for centre, sigma, height in BODIES:
         squared = ((lps_mm - np.array(centre)) ** 2).sum(axis=-1)
@@ -54,7 +54,7 @@ def scene(lps_mm: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def setting(**values: object) -> Change:
-    """Return a change of a header that sets elements by their keywords."""
+    """Return a function that sets elements of a DICOM header by their keywords."""
 
     def change(ds: pydicom.Dataset) -> None:
         for name, value in values.items():
@@ -85,7 +85,11 @@ def grid(
     rotation: NDArray[np.float64] | None = None,
     shift: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Affine:
-    """Return the affine of a grid round the origin. Slices run along row x column or against it."""
+    """Return the affine of a grid whose middle is the origin, moved by `shift` (mm).
+
+    The direction of the slices is the cross product of the row and column directions, or the
+    opposite, as PLANES states.
+    """
     axes = np.array(PLANES[plane], np.float64).T
     if rotation is not None:
         axes = rotation @ axes
@@ -103,7 +107,11 @@ FEW_ORIENTATIONS = [*ORIENTATIONS[::7], ORIENTATIONS[41]]
 
 
 def oriented(order: Sequence[int], signs: Sequence[int], shape: Sequence[int]) -> Affine:
-    """Return a grid round the origin whose stored axes run along those of LPS in this order."""
+    """Return the affine of a grid whose middle is the origin.
+
+    order  for each stored axis (slice, row, column), the index of the LPS axis along which it runs
+    signs  1 or -1 for each stored axis; -1: it runs against the LPS axis
+    """
     affine = np.eye(4)
     affine[:3, :3] = 0
     for stored, (axis, sign) in enumerate(zip(order, signs, strict=True)):
@@ -123,13 +131,13 @@ def tilted(affine: Affine, shape: tuple[int, int, int], degrees: float) -> Affin
 
 
 def places(affine: Affine, shape: Sequence[int]) -> NDArray[np.float64]:
-    """Return LPS mm of every voxel, (*shape, 3)."""
+    """Return the LPS coordinates of every voxel, mm, (*shape, 3)."""
     index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
     return index @ affine[:3, :3].T + affine[:3, 3]
 
 
 def sample(affine: Affine, shape: Sequence[int]) -> NDArray[np.float64]:
-    """Return the scene on a grid."""
+    """Return the scene's values at the voxels of a grid, float64 of this shape."""
     return scene(places(affine, shape))
 
 
@@ -247,8 +255,8 @@ def write_enhanced(
 ) -> Path:
     """Write an enhanced multi-frame image; its frames are shuffled, or in spatial order (None).
 
-    Orientation and spacing are shared, positions per frame; rescale is per frame: slope k + 1 and
-    intercept -10 k of frame k, so that the values are the scene's times that.
+    All frames share the orientation and the spacing; each has its own position and rescale. Slopes
+    alternate between 1 and 2, intercepts between 0, -10 and -20. Rescaled values are the scene's.
     """
     ds = image(np.zeros(shape[1:], np.uint16), affine, 0, modality=modality, slope=None)
     ds.SOPClassUID = ds.file_meta.MediaStorageSOPClassUID = _ENHANCED[modality]
@@ -314,7 +322,10 @@ def write_f_dicom(
 
 
 def write_f_nifti(path: Path, voxels: NDArray[Any], spacing_um: tuple[float, float, float]) -> None:
-    """Write the same voxels at the same place, stored as (left, superior, posterior), in um."""
+    """Write the voxels of `write_f_dicom` at the same position, as NIfTI.
+
+    Its axes are stored as (left, superior, posterior), and lengths are in um.
+    """
     z, y, x = spacing_um
     depth, height, _ = voxels.shape
     affine = np.eye(4)  # to right, anterior, superior

@@ -11,7 +11,7 @@ from stereocell.engine.run import Watch
 
 
 def steady(folder: Path, watch: Watch) -> str:
-    """Report 60 tasks of 50 ms, and keep count of the starts in a file."""
+    """Report 60 tasks of 50 ms; append a character to the file `starts` at each start."""
     with (folder / "starts").open("a") as starts:
         starts.write("*")
     for done in range(61):
@@ -57,7 +57,7 @@ def killed(_: Path, watch: Watch) -> str:
 
 
 def endless(folder: Path, watch: Watch) -> str:
-    """Write the number of the process, and never report a task."""
+    """Write the process ID to the file `build`, and then never report a task or end."""
     (folder / "build.part").write_text(str(os.getpid()))
     (folder / "build.part").rename(folder / "build")
     while True:

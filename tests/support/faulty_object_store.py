@@ -22,9 +22,9 @@ _HOP = ("connection", "transfer-encoding", "keep-alive")
 class Faults:
     """Rules for failing requests; `seen` counts requests by fault.
 
-    rate  share of requests that fail at random
-    only  kinds of random faults
-    once  fault of the next request with this method and this end of the path
+    rate  share of requests that fail at random, 0 to 1
+    only  kinds of faults from which random ones are chosen
+    once  by method and end of the path: the fault of the next request that has both
     """
 
     endpoint: str
@@ -50,7 +50,7 @@ class Faults:
 
 @contextmanager
 def before(endpoint: str) -> Iterator[Faults]:
-    """Serve a proxy of a store on loopback; `Faults.endpoint` is its own address."""
+    """Serve a proxy of a store on loopback; `Faults.endpoint` is the proxy's address."""
     faults = Faults("")
     target = urlsplit(endpoint).netloc
 

@@ -16,7 +16,10 @@ _MM, _UM = 3.0, 0.4  # voxel spacing of a body, and of a microscope
 def _inside(
     *bodies: tuple[tuple[float, float, float], tuple[float, float, float]],
 ) -> NDArray[np.float64]:
-    """Return the share of each voxel in ellipsoids (middle, half axes), blurred by .8 voxels."""
+    """Return the share of each voxel that lies in ellipsoids, 0 to 1, blurred by 0.8 voxels.
+
+    bodies  middle and half axes of each ellipsoid, in voxels (z, y, x)
+    """
     grid = np.indices(SHAPE, dtype=np.float64)
     solid = np.zeros(SHAPE, bool)
     for middle, half in bodies:

@@ -24,7 +24,13 @@ Field = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Member:
-    """One tile: ratio of `brightest` to dimmest body, `photons` of the dimmest, background."""
+    """One tile.
+
+    share       share of the voxels in the bodies
+    brightest   ratio of the brightest body to the dimmest
+    photons     mean photons in a voxel of the dimmest body
+    background  factor of the uneven background
+    """
 
     kind: str
     share: float

@@ -4,7 +4,7 @@ import struct
 
 
 def parse(data):
-    """Read by the tables of the KTX 2.0 specification, sections 3 and 5."""
+    """Parse a KTX2 file by the tables of the KTX 2.0 specification, sections 3 and 5."""
     assert data[:12] == bytes([0xAB, 0x4B, 0x54, 0x58, 0x20, 0x32, 0x30, 0xBB, 0xD, 0xA, 0x1A, 0xA])
     names = ["format", "type_size", "width", "height", "depth"]
     names += ["layers", "faces", "levels", "scheme"]

@@ -41,7 +41,10 @@ def labels_of(out: Path, name: str = "cells") -> NDArray[np.uint32]:
 
 
 def boxes(*spans: tuple[int, ...], shape: tuple[int, int, int]) -> NDArray[np.uint16]:
-    """Return labels of boxes 10 voxels high, 16 wide: (label, first x, last x + 1) of each."""
+    """Return a label map of boxes that are 10 voxels long along z and 16 along y.
+
+    spans  label, first x and last x + 1 of each box, in voxels
+    """
     labels = np.zeros(shape, np.uint16)
     for label, start, stop in spans:
         labels[3:13, 4:20, start:stop] = label

@@ -1,4 +1,4 @@
-"""A level that passes all tests for clear levels; tests derive other levels from it."""
+"""A candidate iso-value that passes all tests for clear ones; tests derive others from it."""
 
 from stereocell.isosurface.level import Level
 

@@ -29,12 +29,12 @@ def write_nd2(
     about: Mapping[str, Any] | None = None,
     depth_loop: Mapping[str, Any] | None = None,
 ) -> dict[int, int]:
-    """Write a file, and return the place of each frame's chunk.
+    """Write an ND2 file; return the byte offset of each frame's chunk by the frame's number.
 
-    tpzcyx   voxels (t, p, z, c, y, x); a frame holds all channels of a plane
-    without  frames that are left out, as in an acquisition that ended early
-    about       more fields of the image's metadata
-    depth_loop  more fields of the loop along z
+    tpzcyx   voxels (t, p, z, c, y, x), p: stage position; a frame holds all channels of a plane
+    without  numbers of frames that are left out, as in an acquisition that ended early
+    about       additional fields of the image's metadata
+    depth_loop  additional fields of the loop along z
     lights   emission in nm by channel; such a channel has no colour of its own
     """
     times, positions, depth, channels, height, width = tpzcyx.shape

@@ -17,7 +17,11 @@ def write(
     form: str = "sform",
     unit: str = "mm",
 ) -> Path:
-    """Write (slice, row, column) voxels as NIfTI does: the first index is the fastest."""
+    """Write voxels (slice, row, column) as NIfTI, which stores the first index as the fastest.
+
+    affine_lps  from voxel indices to LPS, in `unit`
+    form        the header's field that holds the affine: sform or qform; others: neither
+    """
     nifti = nibabel.Nifti1Image(voxels, None)
     nifti.header.set_xyzt_units(unit)
     if form == "sform":

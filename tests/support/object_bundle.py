@@ -27,19 +27,20 @@ from stereocell.storage.json_files import compact_json
 CHANNEL = "cells"
 TILES = ("r0_c0", "r0_c1")
 WIDTH_UM = 60.0  # width of a tile; the second tile begins where the first ends
-GRID = (5, 3, 2)  # cells of a tile along x, y, z
+GRID = (5, 3, 2)  # number of cells of a tile along x, y, z
 APART_UM = 12.0
 RADIUS_UM = 4.0
 RINGS = (16, 8)  # rings of a ball at each level of detail, finest first
 PER_TILE = GRID[0] * GRID[1] * GRID[2]
 COUNT = 2 * PER_TILE + 1
 COLORS = ((0.9, 0.2, 0.1), (0.1, 0.4, 0.9), (0.2, 0.7, 0.2))
-BEAM = ((55.0, -45.0, 8.0), (65.0, -40.0, 16.0))  # the object in both tiles
+# um (x, y, z), low and high corner of the box that lies in both tiles
+BEAM = ((55.0, -45.0, 8.0), (65.0, -40.0, 16.0))
 BOUNDS = ((0.0, -46.0, 0.0), (2 * WIDTH_UM, 0.0, 24.0))
 
 
 def center(row: int) -> tuple[float, float, float]:
-    """Return the centre of the ball of a row, in um."""
+    """Return the centre (x, y, z), um, of the ball in a row of the table."""
     tile, rest = divmod(row, PER_TILE)
     x, rest = rest % GRID[0], rest // GRID[0]
     y, z = rest % GRID[1], rest // GRID[1]
@@ -157,7 +158,7 @@ def make_table(is_wide: bool = False, has_organs: bool = False) -> ObjectTable:
 
 
 def tile_features(table: ObjectTable, tile: str, *, wanted: tuple[str, ...] = ()) -> Features:
-    """Return a tile's objects, with the first column and the requested columns."""
+    """Return a tile's objects, with the table's first column and the columns in `wanted`."""
     rows = table.rows[tile]
     names = dict.fromkeys((table.columns[0].id, *wanted))
     found = [column for name in names if (column := table.column(name)) is not None]

@@ -66,7 +66,10 @@ def write_endless_model(path: Path) -> Path:
 
 
 def write_huge_model(path: Path, *, planes: int = 1 << 29) -> Path:
-    """Write a network of some hundred bytes whose constant takes 4.3 GB, 8 bytes per plane."""
+    """Write a network of some hundred bytes that makes a constant of 4.3 GB.
+
+    planes  the constant takes 8 bytes for each
+    """
     size = numpy_helper.from_array(np.array([1, 2, planes, 1, 1]), "size")
     nodes = [
         helper.make_node("ConstantOfShape", ["size"], ["many"]),

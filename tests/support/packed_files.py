@@ -107,7 +107,10 @@ def tiff(folder: Path, compression: Any, **arguments: Any) -> Stream:
 
 
 def planes(folder: Path, suffix: str) -> Stream:
-    """Write a folder of planes; the stream of a PNG is that in its chunk IDAT."""
+    """Write a folder of one image file per z; return the packed stream of the last file.
+
+    The stream of a PNG is its chunk IDAT.
+    """
     for z, plane in enumerate(NOISE):
         path = folder / f"z{z}{suffix}"
         if suffix == ".png":

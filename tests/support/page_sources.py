@@ -47,7 +47,7 @@ def two_boxes() -> NDArray[np.uint16]:
 
 
 def halved(voxels: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """Return the means of 2 x 2 voxels in the plane."""
+    """Return (c, z, y, x) with the means of 2 x 2 voxels along y and x."""
     c, z, y, x = voxels.shape
     return voxels.reshape(c, z, y // 2, 2, x // 2, 2).mean((3, 5)).astype(np.uint16)
 
@@ -101,7 +101,10 @@ def write_image(path: Path, version: str, *, compressor: Any, shards: bool = Fal
 
 
 def write_sided(path: Path) -> None:
-    """Write a volume of two levels with the sides of RFC-4; none of its axes is canonical."""
+    """Write a volume of two levels whose axes have anatomical orientations, as RFC-4 states them.
+
+    No axis runs in the canonical direction.
+    """
     rng = np.random.default_rng(9)
     fine = rng.normal(60, 9, (24, 40, 56))
     fine[4:14, 8:30, 10:46] += 500

@@ -25,7 +25,8 @@ def write_pet(
     """Write slices whose values are the scene's values plus `add`, in Bq/ml.
 
     first   instance number of the first slice
-    values  elements by keyword; None: the element is absent; a function gets the slice's number
+    values  elements by keyword; None: the element is absent; a function gets the slice's number,
+            from 0, and returns the element
     """
     stated = {
         "Units": "BQML",

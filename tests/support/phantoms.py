@@ -102,7 +102,7 @@ def seam_scene(step: float = 1.8, height: float = 1000.0) -> NDArray[np.uint16]:
 def as_counts(
     field: NDArray[np.float32], low: float, high: float, noise: float = 0.0, seed: int = 0
 ) -> NDArray[np.uint16]:
-    """Scale a field of 0..1 to uint16 between two levels, with Gaussian noise of sigma `noise`."""
+    """Scale a field of 0..1 to uint16 between `low` and `high`; add noise of sigma `noise`."""
     counts = low + (high - low) * field
     if noise:
         counts = counts + np.random.default_rng(seed).normal(0.0, noise, field.shape)

@@ -17,7 +17,10 @@ Array = NDArray[np.float64]
 
 
 class Medium:
-    """Texels with an apron of one texel; positions (n, 3) in um from the box's low corner, y up."""
+    """A volume's texels, with an apron of one texel beyond its box on every side.
+
+    Positions are (n, 3) of (x, y, z), um, from the box's low corner, with y up.
+    """
 
     def __init__(self, run: dict) -> None:
         nx, ny, nz = run["size"]
@@ -30,7 +33,7 @@ class Medium:
         self.albedo = np.array(run["color"], np.float64)
 
     def intensity(self, p: Array) -> Array:
-        """Return trilinear intensities, 0..1; texture rows run against y."""
+        """Return the trilinear intensities, 0..1, at positions; rows of texels run against y."""
         nz, ny, nx = self.texels.shape
         x = p[:, 0] / self.spacing[0] + 1
         y = (self.edges[1] - p[:, 1]) / self.spacing[1] + 1

@@ -21,7 +21,8 @@ RAYS = 1 << 18  # rays that are marched at a time
 CLEAR = 1e-7  # a ray ends below this transmittance, far below what 8 bits show
 ENTRIES = 256
 
-# Directions to the lamps (right, up, back of the eye), and the light of a white surface facing each
+# Directions to the main lamp and to the weaker one, along the camera's axes (right, up, back), and
+# the light of a white surface that faces each lamp
 LIGHT: Triple = (-1.2, 1.6, 2.5)
 FILL: Triple = (1.8, -0.4, 1.8)
 LIGHT_COLOR: Triple = (0.66, 0.62, 0.56)
@@ -29,7 +30,7 @@ FILL_COLOR: Triple = (0.08, 0.1, 0.14)
 SKY: Triple = (0.33, 0.34, 0.37)
 GROUND: Triple = (0.13, 0.125, 0.12)
 GLOSS, EXPONENT = 0.1, 16
-SCATTERED = 1.2  # factor of the light where there is no boundary
+SCATTERED = 1.2  # factor of the light at points where the volume has no boundary
 NOISE_STEP, BOUNDARY_STEP = 0.03, 0.18  # intensity over two voxels; shading fades in between them
 FLAT_STEP = 1e-4  # intensity over two voxels; below it the gradient has no direction
 

@@ -43,7 +43,7 @@ def rewrite(source: str, raised: str = "") -> tuple[str, int]:
 
 
 def _log_line() -> list[ast.stmt]:
-    """Return statements that write a log line, whose names don't occur in the function."""
+    """Return statements that write a log line; their only name is one that no function uses."""
     line = f"import logging as _new; _new.getLogger({_PACKAGE!r}).debug('called')"
     return ast.parse(line).body
 

@@ -17,7 +17,7 @@ _FILES = {
 
 
 def write_small_viewer(folder: Path) -> Path:
-    """Write the viewer's files into a folder; return it."""
+    """Write the small viewer's files into a folder; return the folder."""
     for name, content in _FILES.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)

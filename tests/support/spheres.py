@@ -39,9 +39,11 @@ BLUE = Appearance(
 
 
 def sphere(rings: int, keep: slice) -> Mesh:
-    """Return half of a UV sphere, cut at x = 10; `keep` chooses among its 2 * rings longitudes.
+    """Return half of a UV sphere, cut at x = 10 um.
 
-    The cut edge's vertices are the same floats in both halves.
+    keep  the vertices' longitudes from 0 to 2 * rings that belong to the half
+
+    The vertices on the cut are the same floats in both halves.
     """
     u, v = np.meshgrid(np.linspace(0, 1, 2 * rings + 1), np.linspace(0, 1, rings + 1))
     longitude, latitude = 2 * np.pi * u + np.pi / 2, np.pi * (1 - v)
@@ -70,7 +72,7 @@ def sphere(rings: int, keep: slice) -> Mesh:
 
 
 def ball(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[np.uint8]:
-    """Return a window of the ball's voxels, bright inside; `origin` in voxels, (z, y, x)."""
+    """Return voxels (z, y, x) from `origin` on, which are bright inside the ball."""
     z, y, x = np.indices(shape) + np.reshape(origin, (3, 1, 1, 1))
     world = np.stack([x * SPACING[2], -y * SPACING[1], z * SPACING[0]])
     distance = np.linalg.norm(world - CENTER[:, None, None, None], axis=0)
@@ -78,7 +80,10 @@ def ball(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[n
 
 
 def counts(origin: tuple[int, int, int], shape: tuple[int, int, int]) -> NDArray[np.uint16]:
-    """Return the same window with counts of a 12-bit camera, finer than 8 bits of RED's window."""
+    """Return voxels (z, y, x) from `origin` on, with counts of a 12-bit camera.
+
+    They have more values than the 8 bits to which the window of RED maps them.
+    """
     z, y, x = np.indices(shape) + np.reshape(origin, (3, 1, 1, 1))
     return (100 + (977 * z + 131 * y + 29 * x) % 3901).astype(np.uint16)
 

@@ -28,7 +28,8 @@ F_ID, BALL_ID, EMPTY_ID = (to_identifier(name) for name in NAMES)
 COLORS = ((0.8, 0.1, 0.1), (0.1, 0.2, 0.9), (0.1, 0.7, 0.2))
 SPACING_UM = (0.5, 0.25, 0.25)
 SHAPE = (16, 48, 36)
-CUTS = ((0, 18, 19), (18, 36, 36))  # along x: first and end of own voxels, end of lattice
+# For each tile, voxels along x: first and end of its own voxels, and the end of its lattice
+CUTS = ((0, 18, 19), (18, 36, 36))
 TILES = ("r0_c0", "r0_c1")
 FUNCTIONS = {
     "default": ((0.0, 0.0), (0.3, 0.0), (0.5, 0.3), (1.0, 0.8)),
@@ -39,7 +40,7 @@ FUNCTIONS = {
 
 
 def leaf(tile: str, channel: str, suffix: str = "") -> str:
-    """Return the path of a mesh, or of the prim whose name ends in `suffix`."""
+    """Return the path of a channel's mesh in a tile, or of the prim beside it with this suffix."""
     return f"/Specimen/Tiles/{tile}/{channel}/{channel}_{tile}{suffix}"
 
 

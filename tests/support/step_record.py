@@ -68,11 +68,11 @@ _STEP = re.compile(r"^class \w+\((?:Step\[|Keyed\))", re.MULTILINE)
 
 
 def record() -> dict[str, Any]:
-    """Return what the record should hold.
+    """Return the content that the record should have for the present code.
 
     steps      of each step and reader, by name: its version, a digest of the code that it reaches,
                and the names of all libraries that its modules import, for provenance
-    libraries  the locked versions of those that can change a result
+    libraries  the locked versions of the libraries that can change a result
     """
     steps = {step.__name__: _entry(step.__module__, step.VERSION) for step in find_steps()}
     formats = known_formats()

@@ -1,4 +1,4 @@
-"""Tables as text files, and the lines in which others are refused."""
+"""Write tables as text files, and read the lines in which other tables are refused."""
 
 from pathlib import Path
 

@@ -46,7 +46,7 @@ class ThinBody:
         return z, y, x
 
     def voxels(self, noise: float = 0.0) -> NDArray[np.float32]:
-        """Return the voxels (z, y, x), with Gaussian noise of this deviation in voxel values."""
+        """Return the voxels (z, y, x); `noise` is the standard deviation of their noise."""
         values = GROUND + (BODY - GROUND) * self._filled()
         if noise:
             values += np.random.default_rng(0).normal(0.0, noise, values.shape)

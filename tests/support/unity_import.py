@@ -29,7 +29,7 @@ def boxes(root: Any) -> Iterator[tuple[str, Any]]:
 
 
 def world_of(root: Any, bundle: Path, places_um: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return where places of the specimen (n, 3) are in Unity: mirrored, round its middle."""
+    """Return the positions in Unity of the specimen's points (n, 3): mirrored, round its middle."""
     bounds = load(bundle / "manifest.json")["specimen"]["bounds_um"]
     middle = np.mean([bounds["min"], bounds["max"]], axis=0)
     scale = root["scale"][0]

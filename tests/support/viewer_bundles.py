@@ -31,7 +31,7 @@ def make(source: Path, out: Path, grid: str, *plan: str) -> None:
 
 
 def make_sample(name: str, file: Path, *flags: str) -> Path:
-    """Write a sample, if it isn't there, and return its place."""
+    """Write a sample into a file, unless the file exists, and return the file's path."""
     if not file.exists():
         run("sample", name, file, *flags)
     return file

@@ -107,7 +107,7 @@ def asset_digests(out: Path) -> dict[str, str]:
         name: digest
         for name, digest in digests_of(out).items()
         if name.startswith(("units/", "stage/", "bundle/"))
-        # plan.key depends on the place of the source.
+        # plan.key depends on the path of the source.
         and not name.endswith(("seconds.json", "plan.key"))
     }
 

@@ -157,7 +157,12 @@ BOUND = ("setpriv", "--bounding-set=-dac_override") if os.geteuid() == 0 else ()
 
 
 def in_the_middle_of(phase: str, out: Path, fault: str) -> list[str]:
-    """Return the command of a phase with a fault, which copies the same viewer as this process."""
+    """Return a command that runs a phase, in which the fault happens once the first tile is done.
+
+    fault  "killed", or "read-only": OUT can't be written
+
+    The command copies the viewer of the tests' process.
+    """
     viewer = str(phases.viewer_dist())
     return [sys.executable, "-c", IN_THE_MIDDLE, phase, str(out), fault, viewer]
 
@@ -303,7 +308,7 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """The address of a host that accepts connections and never answers."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         host = f"127.0.0.1:{server.getsockname()[1]}"
-        # These settings make a new file system; that of earlier tests keeps its endpoint.
+        # fsspec caches file systems by their settings. New settings make one with this endpoint.
         storage_options = {"anon": True, "config_kwargs": {"user_agent_extra": host}}
         monkeypatch.setitem(fsspec.config.conf, "s3", storage_options)
         yield host

@@ -186,7 +186,7 @@ def test_damaged_inputs_of_units_are_named_and_computed_again(
 # --- the stage
 
 
-def test_list_has_all_files_of_the_stage_phase(built: Path) -> None:
+def test_stage_s_list_of_hashes_has_all_files_of_the_stage(built: Path) -> None:
     listed = json.loads((built / "stage" / "files.json").read_bytes())
     written = digests_of(built / "stage")
     del written["files.json"]

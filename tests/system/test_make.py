@@ -79,7 +79,7 @@ def make(checkout: Path) -> Make:
 
 
 def calls(checkout: Path) -> list[list[str]]:
-    """Return the words of each call of FAKE since the last look."""
+    """Return the words of each call of FAKE since this function was last called."""
     file = checkout / "calls"
     text = file.read_text("utf-8") if file.exists() else ""
     file.unlink(missing_ok=True)

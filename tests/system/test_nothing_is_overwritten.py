@@ -21,7 +21,10 @@ WORK = b"years of work"
 
 
 def _writing(name: str) -> dict[str, tuple[str, Given]]:
-    """Return trials of a command that writes: ending of the result's name, and words."""
+    """Return by name the trials of a command that writes.
+
+    A trial has the ending of the result's name, and a function that returns the command's words.
+    """
     if name in ("build", "plan"):
         return {name: ("", lambda source, _, place: [name, source, "-o", place])}
     if name == "slices":
@@ -45,7 +48,7 @@ def _writing(name: str) -> dict[str, tuple[str, Given]]:
         }
     if name == "publish":
         return {name: ("", lambda _, build, place: [name, build, place])}
-    return {name: ("", lambda _s, _b, place: [name, place])}  # the build lies at the place itself
+    return {name: ("", lambda _s, _b, place: [name, place])}  # the command writes into the build
 
 
 TRIALS = {

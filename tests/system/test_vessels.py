@@ -109,7 +109,11 @@ def test_thin_branches_stay_connected_to_the_tree(
 
 
 def _sums(*added: tuple[int, int, int, int]) -> list[dict[str, dict[str, int]]]:
-    """Return sums of one tile at each level: all voxels, main, new, and separate ones."""
+    """Return the sums of one tile at each level, from the highest on.
+
+    added  voxels at each level: of all components, of the main ones, of the new parts of these,
+           and of the main ones that touch no main component of a higher level
+    """
     names = ("voxels", "main_voxels", "new_voxels", "apart_voxels")
     return [{"r0_c0": dict(zip(names, one, strict=True))} for one in added]
 

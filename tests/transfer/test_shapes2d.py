@@ -316,7 +316,6 @@ def test_the_bundle_has_the_shapes_and_its_files_match_their_schema(bundle: Path
     assert channel(bundle)["transfer_functions_2d"]["names"] == [NAME]
     found = functions(bundle)
     assert found["gradient_max"] == 0.37
-    # Type: ignore[attr-defined]
     assert {name: shapes_from(s) for name, s in found["functions"].items()} == {NAME: SHAPES}
     blue = functions(bundle, "Hoechst 33342")
     assert blue["functions"] == {}
@@ -361,7 +360,6 @@ def test_an_edit_of_shapes_reaches_the_bundle(stage: Path, tmp_path: Path) -> No
     assert entry["transfer_function"] == NAME  # as chosen in the layer
     found = functions(tmp_path / "bundle")
     edited = Shape("rectangle", (0.1, 0.3), (0.2, 0.8), 0.2, (0, 1, 0), 0.6, 0)
-    # Type: ignore[attr-defined]
     assert {name: shapes_from(s) for name, s in found["functions"].items()} == {NAME: (edited,)}
     assert found["gradient_max"] == 0.74
     counts = sum(

@@ -28,7 +28,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def edited(stage_path: Path, tmp_path: Path) -> Callable[[dict[str, Gf.Vec3f]], Path]:
-    """Return a function that writes a layer of colours, by attribute, over the stage."""
+    """Return a function that writes a layer over the stage: colours by their attribute's path."""
 
     def write(colors: dict[str, Gf.Vec3f]) -> Path:
         layer = Sdf.Layer.CreateNew(str(tmp_path / "edited.usda"))
@@ -45,7 +45,7 @@ def edited(stage_path: Path, tmp_path: Path) -> Callable[[dict[str, Gf.Vec3f]], 
 
 
 def colors_read(path: Path) -> dict[str, tuple[float, ...]]:
-    """Return the bundle's colours of the channel, and of its mesh in each tile."""
+    """Return the colours that a bundle would get: of the channel, and of its mesh in each tile."""
     stage = open_stage(path)
     found = {"channel": read_appearances(stage)[0].color}
     for tile in TILES:

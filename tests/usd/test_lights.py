@@ -39,7 +39,10 @@ def read_image(asset: Sdf.AssetPath) -> NDArray[np.float64]:
 
 
 def light_of_dome(dome: UsdLux.DomeLight, normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the irradiance of a surface by a latlong image: centre at +z, +x to the left, y up."""
+    """Return the irradiance (r, g, b) of a surface by a dome's latlong image.
+
+    The image's centre shines from +z, its left half from +x, and its top from +y.
+    """
     image = read_image(dome.GetTextureFileAttr().Get())
     height, width, _ = image.shape
     down = (np.arange(height) + 0.5)[:, None] / height * np.pi
@@ -63,7 +66,7 @@ def irradiance(stage: Usd.Stage, normal: NDArray[np.float64]) -> NDArray[np.floa
             continue
         assert prim.IsA(UsdLux.DistantLight)
         half = np.radians(UsdLux.DistantLight(prim).GetAngleAttr().Get() / 2)
-        size = np.pi * np.sin(half) ** 2  # divisor of `normalize`
+        size = np.pi * np.sin(half) ** 2  # with `normalize`, UsdLux divides the radiance by this
         if light.GetNormalizeAttr().Get():
             radiance = radiance / size
         towards = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(prim))[2, :3]

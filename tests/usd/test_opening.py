@@ -22,7 +22,7 @@ def _written(folder: Path, *, opens_cut: bool) -> Usd.Stage:
         Appearance("Skin", (1, 1, 1), (0, 1), None, 0.0, "none", FUNCTIONS, opens=False),
         Appearance("Bone", (1, 1, 1), (0, 1), None, 0.0, "none", FUNCTIONS, function="bone"),
     ]
-    # corners (z, y, x) of the voxels' centres, um: the drawn box is half a voxel wider
+    # corner voxels' centres (z, y, x), um; the box that is drawn reaches half a voxel farther
     tile = TileExtent("r0_c0", (0.0, 0.0, 100.0), (30.0, 20.0, 120.0), (2.0, 2.0, 2.0))
     write_stage(folder, "Head", appearances=looks, tiles=[tile], provenance={}, opens_cut=opens_cut)
     return open_stage(folder / "stage.usda")

@@ -42,7 +42,7 @@ def out(made: Path, tmp_path: Path) -> Path:
 
 
 def edit_of(out: Path, folder: Path) -> tuple[Path, Usd.Stage]:
-    """Write an artist's layer over the stage, in a folder of its own."""
+    """Write an artist's layer over the stage into a separate folder; return its path and stage."""
     folder.mkdir(exist_ok=True)
     layer = Sdf.Layer.CreateNew(str(folder / "edit.usda"))
     layer.subLayerPaths = [str(out / "stage" / "stage.usda")]
@@ -56,7 +56,7 @@ def bundle(out: Path, stage: Path | None = None) -> int:
 
 
 def name_asset(stage: Usd.Stage, kind: str, asset: str) -> None:
-    """Make a layer name a file: as its sublayer, in its prims, in a variant, or in metadata."""
+    """Make a layer name a file as a sublayer, in a prim, in a variant, or in metadata."""
     layer = stage.GetRootLayer()
     if kind == "sublayer":
         layer.subLayerPaths.append(asset)

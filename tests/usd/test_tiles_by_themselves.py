@@ -19,7 +19,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def colors_of(mesh: Usd.Prim) -> tuple[Gf.Vec3f, Gf.Vec3f]:
-    """Return the colours of a mesh's material in each renderer, and of the mesh itself."""
+    """Return the colour of a mesh's UsdPreviewSurface, and the display colour of the mesh."""
     material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
     shader, _, _ = material.ComputeSurfaceSource()
     assert shader.GetShaderId() == "UsdPreviewSurface"

@@ -35,7 +35,7 @@ from support.stages import (
 )
 from support.vdb_reader import read_vdb, value_at
 
-# Voxels (z, y, x) at a corner of the F and just outside of it; one corner in each tile
+# Voxels (z, y, x): in each tile a corner of the F, and its three neighbours outside the F
 BORDER = [
     (4, 6, 6),
     (3, 6, 6),
@@ -80,7 +80,10 @@ def points_of(stage: Usd.Stage, channel: str) -> np.ndarray:
 
 
 def surface_color(stage: Usd.Stage, tile: str, channel: str) -> Gf.Vec3f:
-    """Return the colour that Storm draws, which it finds by the binding and then the connection."""
+    """Return the colour that the renderer Storm draws.
+
+    Storm finds it by the mesh's material binding, and then by the shader input's connection.
+    """
     mesh = stage.GetPrimAtPath(leaf(tile, channel))
     material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
     shader = material.ComputeSurfaceSource("glslfx")[0]

@@ -17,7 +17,7 @@ from stereocell.verify.bundle_surfaces import _compare_faces
 
 @pytest.fixture
 def fins() -> Mesh:
-    """Triangles over sharp edges, whose three normals nearly cancel out."""
+    """Triangles whose three vertex normals nearly cancel out, as those over sharp edges do."""
     rng = np.random.default_rng(0)
     corners = rng.normal(size=(200, 3, 3)).astype(np.float32)
     corners += 10 * np.arange(200, dtype=np.float32)[:, None, None]
@@ -44,7 +44,7 @@ def test_rounded_normals_that_nearly_cancel_out_are_no_fault(fins: Mesh, tmp_pat
     assert _faults(fins, fins, tmp_path) == []
 
 
-def test_normals_turned_by_five_degrees_are(fins: Mesh, tmp_path: Path) -> None:
+def test_normals_turned_by_five_degrees_are_a_fault(fins: Mesh, tmp_path: Path) -> None:
     alike = replace(fins, normals=np.repeat(fins.normals[::3], 3, axis=0))
     turned = alike.normals + np.float32(np.tan(np.radians(5))) * np.cross(
         alike.normals, [0.6, 0.0, 0.8]

@@ -227,7 +227,8 @@ def leave_a_texture_stale(out: Path) -> None:
     with Image.open(file) as image:
         mirrored = image.transpose(Image.Transpose.FLIP_LEFT_RIGHT)
     mirrored.save(file)
-    # as if the build had written it so: bundles are made of nothing that is damaged
+    # The stage's hashes are updated, as if the build had written this file. Otherwise no bundle
+    # would be made of it, because the file would count as damaged.
     (out / "stage" / "files.json").unlink()
     write_list(out / "stage", {}, out / "stage")
     digest = digest_of(read_stage_list(out / "stage"))
@@ -307,7 +308,7 @@ SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest
                 SOURCE: "um to the iso-surface, expected",
                 BUNDLE: "lod0: a vertex is",
             },
-            marks=pytest.mark.exhaustive,  # as the vertex that was moved
+            marks=pytest.mark.exhaustive,  # the lines are those of the moved vertex
         ),
         (state_half_the_distance, {FINEST: "); largest distance ", SOURCE: "lod0: "}),
         (
@@ -336,7 +337,7 @@ SOURCE, BUNDLE, MANIFEST = "F against source", "bundle against stage", "manifest
         ),
         (
             double_the_threshold_and_window,
-            # the bundle's voxels are right: those that were measured need no volumeWindow
+            # The bundle's voxels are right, because measured voxels need no volumeWindow.
             {SOURCE: "F: volumeWindow is ", MANIFEST: "F: threshold_normalized is "},
         ),
         (change_a_colour, {MANIFEST: "F: color is ", BUNDLE: "its colour is "}),
@@ -486,8 +487,8 @@ def test_a_bundle_of_an_edited_mesh_is_compared_with_the_edited_mesh(
     assert f"bundle: {edit}" in capsys.readouterr().err
     assert main(["check", str(out), "--deep", "--workers", "0", *flags]) == 0
     assert edit in capsys.readouterr().out
-    assert "lod1: " in failures(out)[BUNDLE]  # against the stage as it was built
-    # the bundle of the edit with the coarser levels and errors as they were is a fault
+    assert "lod1: " in failures(out)[BUNDLE]  # compared with the stage without the edit
+    # A bundle of the edit that still has the unedited stage's coarser levels and errors is a fault.
     file = out / "bundle" / "channels" / "F" / "r0_c0" / "lod1.glb"
     edited = file.read_bytes()
     assert main(["bundle", str(out), "--workers", "0"]) == 0

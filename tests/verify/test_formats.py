@@ -48,7 +48,7 @@ def lines(out):
 
 
 def failed(found):
-    """Names of the lines that fail, but for the plan, which these folders don't have."""
+    """Names of the checks that fail. The plan is left out, because these folders have none."""
     return {name for name, line in found.items() if not line.ok} - {"plan"}
 
 
@@ -69,7 +69,7 @@ def node():
 
 @pytest.fixture(autouse=True)
 def node_finds_nothing(request, monkeypatch):
-    """To start node takes longest: only tests that ask for it look at what it finds."""
+    """Let node's validators find no fault, except in tests that use `node`, which starts slowly."""
     if "node" not in request.fixturenames:
         answer = subprocess.CompletedProcess([], 0, "[]", "")
         monkeypatch.setattr(node_validators, "subprocess", SimpleNamespace(**vars(subprocess)))
@@ -140,8 +140,8 @@ def test_a_changed_byte_of_a_surface_contradicts_its_tileset(out):
     assert "lod1.glb" not in detail
 
 
-def test_a_changed_byte_of_a_level_contradicts_its_list(out):
-    """The finest level lies last."""
+def test_a_changed_byte_of_a_resolution_level_contradicts_the_hash_in_volumes_json(out):
+    """The changed byte belongs to the finest resolution level, which lies last in the file."""
     change_byte(out / "bundle" / VOLUME)
     found = lines(out)
     assert "volume lists" in failed(found)
@@ -157,7 +157,7 @@ def test_surface_without_a_hash_is_found(out):
     assert "found no hash, expected extras.sha-256-128" in found["tilesets"].detail
 
 
-def test_level_without_a_hash_is_found(out):
+def test_resolution_level_without_a_hash_is_found(out):
     path = out / "bundle" / "channels/CD31/volumes.json"
     path.write_text(
         re.sub(r'("length":\d+),"sha256":"\w+"', r"\1", path.read_text("utf-8"), count=1)
@@ -353,7 +353,7 @@ def test_a_bundle_of_objects_passes(cells):
     assert lines(cells)["object tables"].detail == f"{object_bundle.COUNT} objects"
 
 
-def test_a_table_that_is_too_short_and_rows_that_are_not_there_are_named(cells):
+def test_a_column_that_is_too_short_and_rows_beyond_the_table_are_named(cells):
     path = cells / "channels/cells/objects.json"
     content = json.loads(path.read_text("utf-8"))
     content["columns"][0]["bytes"]["bytes"] -= 1
@@ -364,11 +364,11 @@ def test_a_table_that_is_too_short_and_rows_that_are_not_there_are_named(cells):
     assert "r0_c1: found row" in detail
 
 
-def test_parts_of_a_column_that_are_others_than_stated_are_named(cells):
+def test_parts_of_a_column_with_other_hashes_than_stated_are_named(cells):
     path = cells / "channels/cells/objects.json"
     content = json.loads(path.read_text("utf-8"))
     column = content["columns"][2]
-    column["parts"] = [column["exact"]["sha256"]]  # of all its rows, which are few
+    column["parts"] = [column["exact"]["sha256"]]  # the few rows make a single part
     path.write_text(json.dumps(content))
     assert lines(cells)["object tables"].ok
     column["parts"] = ["0" * 64]

@@ -36,13 +36,13 @@ from support.reference_raymarch import decoded, encode, encoded, path_voxels, ps
 
 HERE = Path(__file__).parent
 ROUNDS = int(os.environ.get("ROUNDS", "15"))
-# Another renderer's camera: the camera of ours to compare with
+# By the camera of another renderer: the camera of our renderer with which times are compared
 RIVALS = {"parallel": "narrow"}
 HEAD = (
     ("scene", "camera", "ms", "of ours", "samples", "PSNR", "where", "of its"),
     ("", "", "", "", "a ray", "dB", "drawn", "opacity"),
 )
-NIIVUE_OPAQUE = 0.95  # opacity at which its rays end; it is then scaled to 1
+NIIVUE_OPAQUE = 0.95  # opacity at which NiiVue's rays end; NiiVue then scales the opacity to 1
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Run:
     camera: str
     setting: float
     label: str  # name of the row in the table
-    voxels: float | None  # step length, if the renderer doesn't count its steps
+    voxels: float | None  # length of a step, in voxels; None: the renderer counts its steps
     shading: bool = False
 
 

@@ -46,7 +46,7 @@ TOWARDS_EYE = (0.5, 0.4, 1.0)
 class Scene:
     name: str
     block: Block
-    cameras: dict[str, Camera]  # by name
+    cameras: dict[str, Camera]  # by their names, such as "perspective"
 
     def write(self, folder: Path) -> None:
         """Write NAME.json and NAME.bin: voxels, then the bricks' smallest and largest values."""

@@ -44,7 +44,7 @@ def test_tables_of_spreadsheets_and_pandas_are_read(tmp_path: Path) -> None:
 
 
 def numbers(tmp_path: Path, text: str, name: str = "t.csv") -> dict[str, list[float]]:
-    """Return the number columns of a text table."""
+    """Return the values of each column of numbers in a text table, by the column's name."""
     table = read_table(csv(tmp_path, text, name), "", (), "cells")
     return {c.name: c.numbers.tolist() for c in table.columns if c.numbers is not None}
 

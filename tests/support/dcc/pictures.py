@@ -22,9 +22,10 @@ from support.dcc.view import lights_of
 
 UNITS = {"stage": 1e-6, "flat": 1e-6, "usdz": 1.0}  # metres in a unit of each USD file
 VOLUMES = "add-on, volumes"
-# Seen from the front a .glb is in the shade of Blender's default lamp, which stands behind it
+# Column of the .glb as Blender's default camera sees it. From the front, it is in the shade of
+# Blender's default lamp, which stands behind it.
 BY_DEFAULT_CAMERA = "Blender's view, glb"
-# Blender's renderer for an import without volumes
+# Column of the import without volumes, drawn by Blender's renderer EEVEE
 EEVEE = "add-on, EEVEE"
 COLUMNS = {
     "Storm, stage": ("storm", "stage"),
@@ -46,7 +47,7 @@ COLUMNS = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture and its measures; `drawn` is its silhouette."""
+    """A picture's file and measures; `drawn` is the silhouette: the pixels that are covered."""
 
     file: Path
     drawn: NDArray[np.bool_]
@@ -64,7 +65,7 @@ class Picture:
 def draw_pictures(
     stage_path: Path, folder: Path, size: tuple[int, int], columns: Collection[str] = tuple(COLUMNS)
 ) -> dict[str, Picture]:
-    """Draw a stage and what is exported of it in each program; return the pictures by column."""
+    """Draw a stage and its exported files in each program; return the pictures by column."""
     files = export_files(stage_path, folder)
     small = (size[0] // 2, size[1] // 2)  # for volumes, which take longest to draw
     _draw(files, folder, columns, (size, small))

@@ -22,7 +22,7 @@ STORM = REPOSITORY / "tests/blender/storm.py"
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """A sample's files, and the view in the numbers of each."""
+    """A sample's files, and the camera's view in the units of each, by the file's name."""
 
     stage: Path
     flat: Path
@@ -32,7 +32,7 @@ class Files:
 
 
 def export_files(stage_path: Path, folder: Path) -> Files:
-    """Write the files of a stage that other programs open."""
+    """Export a stage to the files that other programs open; return their paths and views."""
     stage = Usd.Stage.Open(str(stage_path))
     view = view_of(stage)
     names = {"flat": "flat.usdc", "usdz": "light.usdz", "glb": "scene.glb"}
@@ -51,7 +51,7 @@ def export_files(stage_path: Path, folder: Path) -> Files:
 
 
 def draw_by_storm(file: Path, view: View, unit: float, picture: Path, width: int) -> None:
-    """Draw a USD file by Storm, by the lights of the file alone."""
+    """Draw a USD file by Storm into a picture; only the lights of the file shine."""
     layer = write_camera(file, picture.with_suffix(".usda"), view, unit)
     command = [PYTHON, str(STORM), str(layer), "/View", str(picture), str(width)]
     drawn = subprocess.run(command, capture_output=True, text=True, timeout=600)

@@ -15,7 +15,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from support.dcc.view import View
 
-HAIR = 2e-3  # share of the distance; two channels closer together than this count as equally near
+HAIR = 2e-3  # share of the distance from the eye; channels this close together are equally near
 
 
 @dataclass(frozen=True, slots=True)

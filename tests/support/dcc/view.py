@@ -1,4 +1,4 @@
-"""The view that all programs draw: the stage's camera `mono`, in the numbers of each file."""
+"""The view that all programs draw: the stage's camera `mono`, in the units of each file."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -44,8 +44,8 @@ def view_of(stage: Usd.Stage) -> View:
 def lights_of(stage: Usd.Stage) -> dict[str, Any]:
     """Return the stage's lights for a program that reads none.
 
-    suns  by color (linear), intensity, and the direction (x, y, z) that they come from
-    dome  the intensity of the image of usd_assets
+    suns  distant lights: linear color, intensity, and the direction (x, y, z) towards the light
+    dome  intensity of the dome light, whose image is in usd_assets
     """
     suns, dome = [], 0.0
     for prim in stage.GetPrimAtPath(LIGHTS).GetChildren():
@@ -61,13 +61,13 @@ def lights_of(stage: Usd.Stage) -> dict[str, Any]:
 
 
 def fit(view: View, scale: float, shift: NDArray[np.float64]) -> View:
-    """Return a view in a file whose places are `scale * (um - shift)`."""
+    """Convert a view in um to the units of a file, whose coordinates are `scale * (um - shift)`."""
     eye = (np.array(view.eye) - shift) * scale
     return View(tuple(eye.tolist()), view.slopes, view.near * scale, view.far * scale)
 
 
 def write_camera(file: Path, layer: Path, view: View, unit: float) -> Path:
-    """Write a layer over a USD file that adds the camera; return it."""
+    """Write a layer over a USD file that adds the view as the camera /View; return the layer."""
     added = Sdf.Layer.CreateNew(str(layer))
     added.subLayerPaths = [str(file)]
     stage = Usd.Stage.Open(added)

@@ -63,7 +63,7 @@ def replace_volume(bundle: Path, voxels: np.ndarray, channel="CD31", tile="r0_c0
         for level in texture.levels
     ]
     path.write_text(json.dumps(content))
-    manifest = bundle / "manifest.json"  # a new file, as when a bundle is replaced
+    manifest = bundle / "manifest.json"  # written as a new file, as when a bundle is replaced
     text = manifest.read_text("utf-8")
     manifest.unlink()
     manifest.write_text(text)

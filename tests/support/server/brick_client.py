@@ -38,7 +38,10 @@ class BrickClient:
     table_bytes: int = 0
 
     def take(self, data: str | bytes, tables: dict[str, bytes] | None = None) -> list[dict]:
-        """Take in a message; return the answers. tables: a cache by hash."""
+        """Process a message of the server, and return the client's answers.
+
+        tables  bytes of cached tables by their hashes
+        """
         if isinstance(data, str):
             return self._take_text(json.loads(data), tables or {})
         frame = decode_frame(data)
@@ -80,7 +83,7 @@ class BrickClient:
         return tree in self.trees and self.trees[tree].table is not None
 
     def have(self, tree: int) -> dict:
-        """Return the message that names the cached bricks."""
+        """Return the message that names the bricks of a tree that the client already has."""
         bits = np.zeros(len(self.trees[tree].table.nodes), dtype=np.uint8)
         bits[list(self.trees[tree].frames)] = 1
         packed = np.packbits(bits, bitorder="little").tobytes()

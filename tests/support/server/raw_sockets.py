@@ -48,13 +48,18 @@ class Target:
 
 @dataclass(frozen=True)
 class Attack:
-    """right: the allowed answers; "closed" means that the connection ends without an answer."""
+    """An attack on a server, and the right answers.
+
+    sent   description of the attack
+    act    attacks the server, and returns its answer
+    right  the allowed answers; "closed": the connection ends without an answer
+    """
 
     name: str
     sent: str
     act: Callable[[Target], str]
     right: tuple[str, ...]
-    server: str = "plain"  # or "lan"; "few" and "few, lan" have small limits by number
+    server: str = "plain"  # or "lan"; "few" and "few, lan" have small limits on requests
 
 
 def converse(stream: socket.socket, data: bytes, is_whole: Callable[[bytes], bool]) -> bytes:
@@ -118,7 +123,7 @@ def get(path: str, *headers: str, method: str = "GET", host: str = "localhost") 
 
 
 def raw(data: bytes, count: int = 1) -> Callable[[Target], str]:
-    """Return an attack that sends bytes; count: number of answers that may come."""
+    """Return an attack that sends bytes; more answers than `count` are a fault."""
 
     def act(target: Target) -> str:
         with target.dial() as stream:

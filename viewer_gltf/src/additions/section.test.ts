@@ -21,7 +21,7 @@ describe("the section of additions", () => {
     ]);
   });
 
-  it("hides one more addition, and shows one of several hidden ones", () => {
+  it("hides or shows one addition, and keeps the other hidden ones hidden", () => {
     const hiding = (hiddenAdditions: readonly string[], shown: boolean) => {
       const [{ items }] = additionSections(MANIFEST, { hiddenAdditions });
       const [first] = items;

@@ -48,7 +48,7 @@ describe("a request", () => {
   it.each([
     ["", "can't be reached, or forbids this page"],
     [503, "answers with status 503"],
-  ])("that fails for the host's sake (%s) is reported once for all", async (status, fault) => {
+  ])("that fails because of the host (%s) is reported once for all", async (status, fault) => {
     vi.useFakeTimers();
     vi.stubGlobal("fetch", async () => {
       if (status === "") throw new TypeError("no network");

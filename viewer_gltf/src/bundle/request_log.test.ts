@@ -1,6 +1,6 @@
 import { expect, it, vi } from "vitest";
 
-it("logs each address and range once, and whether it was answered", async () => {
+it("the request log has each address and range once, and whether it was answered", async () => {
   vi.resetModules(); // other tests of this process have added to the log
   const { noteAsked, allAsked, allAnswered } = await import("./request_log");
   noteAsked("https://host/a", undefined);

@@ -6,8 +6,8 @@ import { blueNoise, NOISE_SIZE } from "./blue_noise";
 const N = NOISE_SIZE;
 
 /**
- * Mean power at frequencies below a share of the Nyquist frequency, without the mean, divided by
- * the mean power of all. White noise gives 1.
+ * Mean power of the frequencies below a share of the Nyquist frequency, except frequency 0, divided
+ * by the mean power of all frequencies. White noise gives 1.
  */
 function lowPower(texels: ArrayLike<number>, share: number): number {
   const cosine = Array.from({ length: N }, (_, i) => Math.cos((2 * Math.PI * i) / N));

@@ -14,12 +14,12 @@ function context(extensions: readonly string[], samples: readonly number[]): Lin
   } as LinearContext;
 }
 
-it("uses half floats if either extension allows drawing into them", () => {
+it("a render target has half floats if either extension allows drawing into them", () => {
   expect(hasHalfFloats(context(["EXT_color_buffer_float"], [8, 4, 2]))).toBe(true);
   expect(hasHalfFloats(context(["EXT_color_buffer_half_float"], [4]))).toBe(true);
 });
 
-it("does not use them if they can't be drawn into or multisampled", () => {
+it("a render target has no half floats if they can't be drawn into or multisampled", () => {
   expect(hasHalfFloats(context([], [4]))).toBe(false);
   expect(hasHalfFloats(context(["EXT_color_buffer_float"], []))).toBe(false);
   expect(hasHalfFloats(context(["EXT_color_buffer_float"], [2]))).toBe(false);

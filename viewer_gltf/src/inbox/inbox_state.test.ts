@@ -14,7 +14,7 @@ const read = (items: unknown[], more = {}) =>
   ) as InboxState;
 
 describe("a message of the server", () => {
-  it("is read by its names", () => {
+  it("is read by the names of its fields", () => {
     expect(read([ITEM])).toEqual({
       mayUpload: true,
       limits: { bytes: 100, files: 5, piece: 8, freeBytes: 70, hours: 24 },
@@ -30,7 +30,7 @@ describe("a message of the server", () => {
     });
   });
 
-  it("is left out if it is none, and gives no right that it does not state", () => {
+  it("is null if it has another form, drops malformed items, and gives no right unless stated", () => {
     for (const text of ["", "null", "7", "[]", "{", '{"items": 3}']) {
       expect(readInboxState(text), text).toBeNull();
     }
@@ -38,14 +38,14 @@ describe("a message of the server", () => {
     expect(read([{ ...ITEM, doing: "sleeping" }, null, { ...ITEM, id: "../a" }]).items).toEqual([]);
   });
 
-  it("leads to no other page than one of its own", () => {
+  it("leads to no page outside the item's own folder", () => {
     const elsewhere = ["//host/", "https://host/", "items/../x/", "items/a1/view", "javascript:1"];
     for (const page of elsewhere) expect(read([{ ...ITEM, page }]).items[0].page, page).toBe("");
   });
 });
 
-describe("what was understood", () => {
-  it("has its choices, each with the words that are shown", () => {
+describe("the server's answer about the content of an upload", () => {
+  it("has the offered choices, each with the text that is shown", () => {
     const found = readUnderstood({
       format: "OME-TIFF",
       size_voxels: [9, 8, 7],
@@ -70,7 +70,7 @@ describe("what was understood", () => {
     expect([found.background, found.channelOptions]).toEqual([null, [{ id: "0", text: "DNA" }]]);
   });
 
-  it("is empty where the answer is none", () => {
+  it("is read as an empty content if it has another form", () => {
     for (const answer of [null, 7, [], "x"]) {
       expect(readUnderstood(answer)).toMatchObject({ format: "", slices: [], preset: null });
     }

@@ -42,6 +42,6 @@ it.each([
   expect(inPageWords(line)).toBe(words);
 });
 
-it.each(["a--b is -- fine", "from 2020-01-02", "", "a.tif: cut off"])("%s stays", (line) => {
+it.each(["a--b is -- fine", "from 2020-01-02", "", "a.tif: cut off"])("%s is unchanged", (line) => {
   expect(inPageWords(line)).toBe(line);
 });

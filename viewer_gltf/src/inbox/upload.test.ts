@@ -3,11 +3,11 @@ import { Server } from "./server";
 import { type Progress, Upload } from "./upload";
 import { UploadFiles } from "./upload_files";
 
-/** Most bytes that the server takes at once, which is also the least that a page sends. */
+/** Bytes of a piece: the most that the server takes at once, and the least that a page sends. */
 const PIECE = 2 ** 16;
 const TOTAL = 5 * PIECE;
 
-/** Time for what is under way but for waits: to read a blob takes several turns of Node's loop. */
+/** Lets work finish that waits for no timer. Reading a blob takes several turns of the event loop. */
 async function rest(): Promise<void> {
   for (let i = 0; i < 20; i++) await new Promise((resolve) => setImmediate(resolve));
 }
@@ -24,7 +24,7 @@ async function passUntil(settled: Promise<unknown>): Promise<void> {
   }
 }
 
-/** Bytes that differ from each other near and far. */
+/** Bytes of which neighbours differ, and bytes far apart, too, so that a wrong order is noticed. */
 const CONTENT = new Uint8Array(TOTAL).map((_, i) => (i * 31 + (i >> 8) * 7) % 251);
 
 function filesOf(content = CONTENT): UploadFiles {
@@ -39,7 +39,7 @@ function filesOf(content = CONTENT): UploadFiles {
 
 type Fault = "cut" | "lost" | "behind" | number;
 
-/** A server that keeps bytes as the real one does. Each request meets the next of the faults. */
+/** A server that stores bytes like the real one. Each request gets the next fault; null: none. */
 class Store {
   bytes = new Uint8Array(0);
   readonly requests: string[] = [];
@@ -106,7 +106,7 @@ describe("an upload", () => {
     expect(reports.at(-1)).toMatchObject({ doing: "complete", sent: TOTAL, total: TOTAL });
   });
 
-  it("begins where the server has got to, as after a reload", async () => {
+  it("begins behind the bytes that the server already has, as after a reload", async () => {
     const store = new Store();
     store.bytes = CONTENT.slice(0, 3 * PIECE + 17);
     await finish(store, 3 * PIECE + 17);
@@ -122,27 +122,27 @@ describe("an upload", () => {
     expect(store.requests.filter((each) => each.startsWith("HEAD"))).toHaveLength(4);
   });
 
-  it("follows a server that has got to another place", async () => {
+  it("continues behind the bytes that the server has, even if they are fewer than were sent", async () => {
     const store = new Store([null, null, "behind"]);
     await finish(store);
     expect(store.isWhole).toBe(true);
   });
 
-  it("waits while the server is busy or full, and repeats its words", async () => {
+  it("waits while the server is busy or full, and shows the server's reason", async () => {
     const store = new Store([null, 507, 503]);
     const reports = await finish(store);
     expect(store.isWhole).toBe(true);
     expect(reports.find(({ doing }) => doing === "lost")?.line).toBe("The disk is full.");
   });
 
-  it.each([403, 404, 413])("ends where the server refuses it for good: %i", async (status) => {
+  it.each([403, 404, 413])("ends if the server refuses it for good: status %i", async (status) => {
     const store = new Store([null, status]);
     const reports = await finish(store);
     expect(reports.at(-1)).toMatchObject({ doing: "refused", line: "The disk is full." });
     expect(store.requests).toHaveLength(2);
   });
 
-  it("waits longer and longer, and not at all once a person says so", async () => {
+  it("waits longer after each lost request, and not at all if the user asks to try now", async () => {
     const store = new Store(["lost", "lost", "lost", "lost", "lost"]);
     const { upload } = prepare(store);
     const run = upload.run();

@@ -4,7 +4,7 @@ import { UploadFiles } from "./upload_files";
 const bytesOf = (...values: number[]) => new Blob([new Uint8Array(values)]);
 const read = async (blob: Blob) => [...new Uint8Array(await blob.arrayBuffer())];
 
-/** A folder as OME-Zarr has it: an empty file, short ones, and one that is longer than a piece. */
+/** A folder like that of an OME-Zarr: an empty file, two short files, and a longer one. */
 const FILES = [
   { name: "a.zarr/1/0", file: bytesOf(5, 6, 7, 8, 9, 10, 11) },
   { name: "a.zarr/.zattrs", file: bytesOf(1, 2) },
@@ -14,7 +14,7 @@ const FILES = [
 const STREAM = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
 describe("the files of an upload", () => {
-  it("are one stream in the order of their names, whatever the order in which they were found", () => {
+  it("are one stream in the order of their names, in whichever order they were found", () => {
     const list = [
       ["a.zarr/.zattrs", 2],
       ["a.zarr/0/0", 0],
@@ -25,13 +25,13 @@ describe("the files of an upload", () => {
     expect(new UploadFiles(FILES.toReversed()).list).toEqual(list);
   });
 
-  it("are without what systems leave in folders, and with what begins with a dot in OME-Zarr", () => {
+  it("leave out files that operating systems add to folders, but not OME-Zarr's files with a dot", () => {
     const names = ["x/.DS_Store", "x/Thumbs.db", "x/._a.tif", "__MACOSX/x/a.tif", "x/desktop.ini"];
     const left = [...names, "x/.zgroup", "x/a.tif"].map((name) => ({ name, file: bytesOf(1) }));
     expect(new UploadFiles(left).list.map(([name]) => name)).toEqual(["x/.zgroup", "x/a.tif"]);
   });
 
-  it("come in pieces of any bounds, over the bounds of files", async () => {
+  it("are read in pieces between any two bytes of the stream, also across files", async () => {
     const files = new UploadFiles(FILES);
     expect(files.bytes).toBe(STREAM.length);
     for (let start = 0; start <= STREAM.length; start++) {
@@ -43,7 +43,7 @@ describe("the files of an upload", () => {
     }
   });
 
-  it("have a mark that differs where bytes differ that the list does not tell", async () => {
+  it("have a fingerprint that differs if bytes differ, even with the same names and sizes", async () => {
     const mark = (...values: number[]) =>
       new UploadFiles([
         { name: "01.dcm", file: bytesOf(...values) },
@@ -60,7 +60,7 @@ describe("the files of an upload", () => {
     expect(await long(1)).not.toBe(await long(2));
   });
 
-  it("names the files that a piece lies in", () => {
+  it("are found by name for each piece of the stream", () => {
     const files = new UploadFiles(FILES);
     const namesIn = (start: number, end: number) =>
       files.filesIn(start, end).map(({ name }) => name.slice("a.zarr/".length));
@@ -69,7 +69,7 @@ describe("the files of an upload", () => {
     expect(namesIn(6, 11)).toEqual(["1/0"]);
   });
 
-  it("are not read before they are sent: a piece holds few of many files", () => {
+  it("are not read before they are sent: a piece refers to few of many files", () => {
     let reads = 0;
     const many = Array.from({ length: 1000 }, (_, i) => {
       const file = new Blob([new Uint8Array(1000)]);

@@ -18,7 +18,7 @@ const LIMITS = { bytes: 2e9, files: 1000, piece: 8e6, freeBytes: 3e9, hours: 24 
 const VIEW = "items/a1/view/";
 const UPLOADING = item({ doing: "uploading", bytes: 312e6, total: 1.2e9 });
 
-describe("bytes", () => {
+describe("a number of bytes", () => {
   it.each([
     [0, "0 bytes"],
     [999, "999 bytes"],
@@ -26,7 +26,7 @@ describe("bytes", () => {
     [312e6, "312 MB"],
     [1.24e9, "1.2 GB"],
     [5e15, "5000 TB"],
-  ])("%d are %s", (bytes, text) => expect(bytesText(bytes)).toBe(text));
+  ])("of %d is written as %s", (bytes, text) => expect(bytesText(bytes)).toBe(text));
 });
 
 it("shows that an image waits for the one before it", () => {
@@ -37,7 +37,7 @@ it("shows that an image waits for the one before it", () => {
   );
 });
 
-describe("the words for an upload of this page", () => {
+describe("the sentence about an upload of this page", () => {
   it.each([
     [{}, "312 MB of 1.2 GB. Keep this page open."],
     [{ left_s: 41 }, "312 MB of 1.2 GB, about 45 s left. Keep this page open."],
@@ -55,7 +55,7 @@ describe("the words for an upload of this page", () => {
   });
 });
 
-describe("the words for an item", () => {
+describe("the sentence about an item of the inbox", () => {
   it.each([
     [
       UPLOADING,
@@ -80,7 +80,7 @@ describe("the words for an item", () => {
     [item({ doing: "built", hasUpload: false }), "All surfaces are built."],
   ])("%o", (shown, words) => expect(wordsOf(shown, null, false, LIMITS)).toBe(words));
 
-  it("distinguish an upload by another page from an abandoned one", () => {
+  it("distinguishes an upload by another page from an abandoned one", () => {
     expect(wordsOf(UPLOADING, null, true, LIMITS)).toBe(
       "312 MB of 1.2 GB have arrived from another page.",
     );
@@ -89,7 +89,7 @@ describe("the words for an item", () => {
     expect(stateName(UPLOADING, upload({ doing: "lost" }), false)).toBe("No connection");
   });
 
-  it("come with a finished share of the upload or the build", () => {
+  it("has beside it the finished share of the upload or the build", () => {
     expect(shareOf(UPLOADING, null)).toBeCloseTo(0.26);
     expect(shareOf(UPLOADING, upload({ sent: 600e6 }))).toBe(0.5);
     expect(shareOf(item({ doing: "building", share: 0.4 }), null)).toBe(0.4);
@@ -97,7 +97,7 @@ describe("the words for an item", () => {
   });
 });
 
-describe("the actions that a user is offered", () => {
+describe("the actions that a user is offered for an item", () => {
   const can = (shown: Item, changes = {}): readonly ActionName[] =>
     actionsOf(shown, {
       ...{ upload: null, mayUpload: true, hasHandles: false, isMoving: false, isUnderstood: false },
@@ -115,7 +115,7 @@ describe("the actions that a user is offered", () => {
     [item({ doing: "built", page: VIEW }), ["open", "delete"]],
   ] as const)("%o", (shown, names) => expect(can(shown)).toEqual(names));
 
-  it("depend on the files that this page and this browser remember", () => {
+  it("depend on whether this page or this browser still has the files", () => {
     expect(can(UPLOADING)).toEqual(["delete"]);
     expect(can(UPLOADING, { hasHandles: true })).toEqual(["go-on", "delete"]);
     expect(can(UPLOADING, { hasHandles: true, isMoving: true })).toEqual(["delete"]);
@@ -128,7 +128,7 @@ describe("the actions that a user is offered", () => {
     }
   });
 
-  it("is only to look at images without the right to upload", () => {
+  it("are only to open a page if the user has no right to upload", () => {
     for (const doing of ["understood", "building", "built"] as const) {
       expect(can(item({ doing }), { mayUpload: false })).toEqual([]);
       expect(can(item({ doing, page: VIEW }), { mayUpload: false })).toEqual(["open"]);
@@ -136,7 +136,7 @@ describe("the actions that a user is offered", () => {
   });
 });
 
-describe("before a deletion", () => {
+describe("the question before a deletion", () => {
   it.each([
     [UPLOADING, "the unfinished upload"],
     [item({ total: 1.2e9 }), "the upload (1.2 GB)"],
@@ -154,12 +154,12 @@ describe("before a deletion", () => {
   });
 });
 
-describe("files that can't be uploaded", () => {
+describe("files that are dropped for an upload", () => {
   it.each([
     [0, 0, /^No files were found/],
     [1001, 10, /1001 files, but this server takes at most 1000/],
     [3, 2.5e9, /2\.5 GB, but this server takes at most 2\.0 GB/],
-  ])("%d files, %d bytes", (files, bytes, words) => {
+  ])("are refused if there are none or too many: %d files, %d bytes", (files, bytes, words) => {
     expect(refusalOf(files, bytes, LIMITS)).toMatch(words);
   });
 

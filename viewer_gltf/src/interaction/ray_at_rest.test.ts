@@ -14,17 +14,17 @@ function play(rays: readonly Ray[]): number {
   return rest?.elapsed_s ?? 0;
 }
 
-it("continues while the ray only trembles", () => {
+it("a rest continues while the ray only trembles", () => {
   const rays = Array.from({ length: 11 }, (_, i) => rayAt(i % 2, i % 3));
   expect(play(rays)).toBeCloseTo(1);
 });
 
-it("starts again if the ray turns or its origin moves", () => {
+it("a rest starts again if the ray turns or its origin moves", () => {
   expect(play([rayAt(0), rayAt(0), rayAt(5), rayAt(5)])).toBeCloseTo(0.1);
   expect(play([rayAt(0), rayAt(0), rayAt(0, 4), rayAt(0, 4)])).toBeCloseTo(0.1);
 });
 
-it("does not continue during a slow drift", () => {
+it("a rest does not continue during a slow drift", () => {
   const rays = Array.from({ length: 50 }, (_, i) => rayAt(0.25 * i));
   expect(play(rays)).toBeLessThan(0.6);
 });

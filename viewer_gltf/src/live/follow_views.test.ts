@@ -26,7 +26,7 @@ function page() {
   };
 }
 
-it("shows each newer view exactly once", async () => {
+it("a page that follows a build shows each newer view exactly once", async () => {
   const { show, shown, goOn } = page();
   const views = new ViewFollower(ROOT, "", show);
   views.take(view(""));
@@ -39,7 +39,7 @@ it("shows each newer view exactly once", async () => {
   expect(shown).toEqual([`${ROOT}g1/`, `${ROOT}g2/`]);
 });
 
-it("skips views that became outdated while another one was opening", async () => {
+it("a page that follows a build skips views that became outdated while another was opening", async () => {
   const { show, shown, goOn } = page();
   const views = new ViewFollower(ROOT, "", show);
   views.take(view("g1/"));
@@ -63,7 +63,7 @@ it("shows the bundle last, at the page's own address, even if the first view had
   expect(changes).toEqual([true]);
 });
 
-it("tries a view again that could not be shown", async () => {
+it("a page that follows a build tries a view again that could not be shown", async () => {
   const { show, shown, goOn, failNext } = page();
   const views = new ViewFollower(ROOT, `${ROOT}g1/`, show, undefined, 1);
   failNext();

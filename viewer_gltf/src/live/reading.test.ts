@@ -11,7 +11,7 @@ it.each([
   expect(wordsOfReading(share)).toBe(words);
 });
 
-it("reports progress while the job runs, and not afterwards", async () => {
+it("progress in reading a source is reported while the job runs, and not afterwards", async () => {
   const fetched = vi.fn(async (_: URL) => ({ json: async () => ({ share: 0.5 }) }));
   vi.stubGlobal("fetch", fetched);
   const texts: string[] = [];
@@ -28,7 +28,7 @@ it("reports progress while the job runs, and not afterwards", async () => {
   expect(texts.length).toBe(1);
 });
 
-it("passes on the job's fault, and survives a server that does not answer", async () => {
+it("a fault of the job is passed on, even if the server does not report progress", async () => {
   vi.stubGlobal("fetch", async () => {
     throw new TypeError("no network");
   });
@@ -36,7 +36,7 @@ it("passes on the job's fault, and survives a server that does not answer", asyn
   await expect(whileReading("http://localhost/", job, () => undefined)).rejects.toThrow("gone");
 });
 
-it("runs if the server has announced it in the timing of the page", () => {
+it("a source is known to be read if the server has announced it in the timing of the page", () => {
   const timing = (names: readonly string[]) =>
     vi.stubGlobal("performance", {
       getEntriesByType: () => [{ serverTiming: names.map((name) => ({ name })) }],

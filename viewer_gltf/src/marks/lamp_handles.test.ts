@@ -132,7 +132,7 @@ describe("a lamp that is dragged", () => {
 
   it("is moved by the action, with um converted to edges and back, and only while it has a handle", () => {
     const state = after(TRACED, SHOWN, put(0, 0, 0, 1));
-    const ray = towards([500, -200, 3100], [1100, -200, 900]); // 0.6, 0, 0.8
+    const ray = towards([500, -200, 3100], [1100, -200, 900]); // meets (0.6, 0, 0.8), in edges
     const drag = dragLamp("lamp-0", ray, state, SPECIMEN, false);
     if (drag?.action?.type !== "move-lamp") throw new Error("no drag");
     expect(drag.action.lamp).toBe(0);

@@ -107,7 +107,7 @@ describe("a ray that begins in a removed corner", () => {
     const ahead = (origin: Vec3, direction: Vec3) =>
       clipSpan([0, 100], { origin, direction }, clip);
     expect(ahead([50, 50, 50], [0, 0, -1])).toEqual([20, 100]);
-    expect(ahead([50, 50, 50], [-1, -1, 0])).toEqual([30, 100]); // by y, before x
+    expect(ahead([50, 50, 50], [-1, -1, 0])).toEqual([30, 100]); // at y = 20, before x = 10
     expect(ahead([50, 50, 50], [0, 0, 1])).toBeNull(); // never leaves the corner
     expect(ahead([50, 10, 50], [0, 0, -1])).toEqual([0, 100]); // passes beside the corner
     expect(isKept([11, 21, 31], clip)).toBe(false);

@@ -21,7 +21,7 @@ function area(corners: readonly Vec3[], normal: Vec3): number {
   return sum;
 }
 
-it("is a square, a triangle or a regular hexagon in a cube", () => {
+it("the section of a cube by a plane is a square, a triangle or a regular hexagon", () => {
   expect(area(planeSection({ normal: [0, 0, 1], offset_um: 0.5 }, CUBE), [0, 0, 1])).toBeCloseTo(4);
   const n = 1 / Math.sqrt(3);
   const normal: Vec3 = [n, n, n];
@@ -33,12 +33,12 @@ it("is a square, a triangle or a regular hexagon in a cube", () => {
   expect(area(hexagon, normal)).toBeCloseTo(3 * Math.sqrt(3)); // edges of length sqrt(2)
 });
 
-it("is empty if the plane misses the box", () => {
+it("the section is empty if the plane misses the box", () => {
   expect(planeSection({ normal: [1, 0, 0], offset_um: 2.1 }, CUBE)).toEqual([]);
   expect(planeSection({ normal: [1, 0, 0], offset_um: -0.1 }, CUBE)).toEqual([]);
 });
 
-it("has convex corners on the plane and in the box, in order, for any plane", () => {
+it("the section is convex, with corners on the plane and in the box, in order, for any plane", () => {
   const random = seeded(5);
   const box: Box = { min: [-3, 0, 5], max: [7, 1, 9] };
   for (let run = 0; run < 300; run++) {

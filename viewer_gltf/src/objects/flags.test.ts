@@ -11,7 +11,7 @@ async function flagged(view: Partial<ObjectView>, neighbours: readonly number[] 
   return [...flags];
 }
 
-describe("which objects show", () => {
+describe("the objects that show", () => {
   it("are all objects at the start", async () => {
     expect(await flagged({})).toEqual([1, 1, 1, 1, 1, 1]);
   });
@@ -22,7 +22,7 @@ describe("which objects show", () => {
   });
 
   it("lie within all ranges, which leaves out objects without a value", async () => {
-    expect(await flagged({ ranges: { size: [1, 255] } })).toEqual([1, 1, 1, 1, 1, 1]); // no filter
+    expect(await flagged({ ranges: { size: [1, 255] } })).toEqual([1, 1, 1, 1, 1, 1]); // all values
     expect(await flagged({ ranges: { size: [64, 255] } })).toEqual([0, 0, 1, 1, 1, 1]);
     const both = { ranges: { size: [2, 200] as const }, without: { type: [1] } };
     expect(await flagged(both)).toEqual([0, 0, 1, 1, 0, 0]);

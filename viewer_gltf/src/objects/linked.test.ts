@@ -47,7 +47,7 @@ describe("objects in a link", () => {
       column: (id) => others.find((each) => each.id === id) ?? null,
       label: (row) => String(106 - row),
     });
-    expect(found.selected).toEqual([1, 4, 5, 6]); // 105, 102, 101, 100
+    expect(found.selected).toEqual([1, 4, 5, 6]); // rows of the objects 105, 102, 101 and 100
     expect(found.picked).toBe(2);
     expect(found.without).toEqual({ type: [2] });
     const [low, high] = found.ranges?.size ?? [];

@@ -2,8 +2,8 @@ import { BoxGeometry, SphereGeometry } from "three";
 import { expect, it } from "vitest";
 import { outwards } from "./object_material";
 
-it("moves all vertices of an object at one position the same way, so that no crease tears", () => {
-  const box = new BoxGeometry(2, 2, 2); // has each corner three times, once for each side's normal
+it("vertices of one object at one position move in the same direction, so that no crease tears", () => {
+  const box = new BoxGeometry(2, 2, 2); // has three vertices at each corner, one for each side
   const { position } = box.attributes;
   const ways = outwards(box, new Float32Array(position.count));
   for (let i = 0; i < position.count; i++) {
@@ -13,13 +13,13 @@ it("moves all vertices of an object at one position the same way, so that no cre
   }
 });
 
-it("moves the vertices of two touching objects separately", () => {
+it("vertices of two touching objects move in their own directions", () => {
   const box = new BoxGeometry(2, 2, 2);
   const rows = Float32Array.from({ length: 24 }, (_, i) => (i < 4 ? 0 : 1));
   expect([...outwards(box, rows).subarray(0, 3)]).toEqual([127, 0, 0]); // the first side alone
 });
 
-it("moves vertices along the normal if the surface has no crease", () => {
+it("vertices move along the normal if the surface has no crease", () => {
   const ball = new SphereGeometry(1, 12, 8);
   const { normal } = ball.attributes;
   const ways = outwards(ball, new Float32Array(normal.count));

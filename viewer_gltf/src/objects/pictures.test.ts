@@ -12,13 +12,13 @@ import {
 } from "./pictures";
 import { sampleContent } from "./sample_table";
 
-it("counts the bytes of all rows, and of the shown ones", () => {
+it("the histogram of a column counts the bytes of all rows, and of the shown rows", () => {
   const [all, left] = countBytes(Uint8Array.of(0, 1, 1, 255), Uint8Array.of(1, 0, 3, 1));
   expect([all[0], all[1], all[255]]).toEqual([1, 2, 1]);
   expect([left[0], left[1], left[255]]).toEqual([1, 1, 1]);
 });
 
-it("converts a byte to its position and back", () => {
+it("a byte is converted to its position in the picture and back", () => {
   for (const byte of [1, 2, 100, 255]) expect(byteAt(placeOf(byte))).toBe(byte);
   expect([byteAt(-1), byteAt(2)]).toEqual([1, 255]);
 });

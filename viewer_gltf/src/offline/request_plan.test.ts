@@ -6,7 +6,7 @@ const FIXED = ["app.webmanifest", "icon.svg"];
 const plan = (address: string, page: string | null = FOLDER) =>
   planFor(address, FOLDER, page, FIXED);
 
-it("keeps all files of a bundle except large ones that no page draws", () => {
+it("the offline store keeps all files of a bundle except large ones that no page draws", () => {
   const large = MAX_KEPT_USDZ_BYTES + 1;
   expect(isKept({ path: "volumes/a.ktx2", bytes: large })).toBe(true);
   expect(isKept({ path: "specimen.usdz", bytes: large })).toBe(false);

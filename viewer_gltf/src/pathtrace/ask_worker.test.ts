@@ -32,14 +32,14 @@ class Echo extends EventTarget {
 const ask = (worker: Echo, id: number) =>
   askWorker<{ id: number; text: string }>(worker, { id }, [], "nothing was put together");
 
-it("returns the answer to the same question", async () => {
+it("each question to a worker gets its own answer, in any order of the answers", async () => {
   const worker = new Echo();
   const asked = [1, 2].map((id) => ask(worker, id));
   worker.answer();
   expect((await Promise.all(asked)).map(({ text }) => text)).toEqual(["answer 1", "answer 2"]);
 });
 
-it("removes all listeners after an answer or a failure", async () => {
+it("a question to a worker leaves no listener after an answer or a failure", async () => {
   const worker = new Echo();
   const asked = ask(worker, 1);
   worker.answer();

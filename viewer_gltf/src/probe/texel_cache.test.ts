@@ -46,7 +46,7 @@ beforeEach(() => {
   vi.mocked(decodeTexels).mockClear();
 });
 
-it("takes the finest available level that is small enough", async () => {
+it("the cache of texels gives the finest available level that is small enough", async () => {
   const source = sourceOf(volumeOf("a", [64, 32, 16]), [2, 1]);
   expect(availableLevel(source)).toBe(1);
   expect(availableLevel(source, 5000)).toBe(2);
@@ -57,14 +57,14 @@ it("takes the finest available level that is small enough", async () => {
   expect(decodeTexels).toHaveBeenCalledTimes(1);
 });
 
-it("fetches a level of moderate size if none is available", async () => {
+it("the cache of texels fetches a level of moderate size if none is available", async () => {
   const cache = new TexelCache(reopen);
   const level = await cache.best(sourceOf(volumeOf("a", [256, 128, 64]), []));
   expect(level.size).toEqual([128, 128, 128]);
   expect(level.texels[0]).toBe(1);
 });
 
-it("decodes a repeatedly requested level only once, and drops the least recently used one", async () => {
+it("a repeatedly requested level is decoded only once, and the least recently used level is dropped", async () => {
   const cache = new TexelCache(reopen);
   const side = Math.cbrt(27 * MIB);
   const [a, b, c] = ["a", "b", "c"].map((name) => sourceOf(volumeOf(name, [side]), [0]));
@@ -79,7 +79,7 @@ it("decodes a repeatedly requested level only once, and drops the least recently
   expect(decodeTexels).toHaveBeenCalledTimes(4);
 });
 
-it("tries again after a fault", async () => {
+it("a level that failed to decode is tried again at the next request", async () => {
   const cache = new TexelCache(reopen);
   const source = sourceOf(volumeOf("a", [4]), [0]);
   vi.mocked(decodeTexels).mockRejectedValueOnce(new Error("broken"));

@@ -39,7 +39,7 @@ describe("the scene of a light page", () => {
     expect([hexOf(), backdrop.mesh.visible]).toEqual(["0b0d12", false]);
   });
 
-  it("is empty if a camera shows the user's own specimenScene", () => {
+  it("has no background if a camera shows the user's own room", () => {
     specimenScene.isSeeThrough = true;
     specimenScene.isFlat = true; // a phone shows one image
     expect([hexOf(), backdrop.mesh.visible]).toEqual(["none", false]);

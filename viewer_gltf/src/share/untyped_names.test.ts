@@ -12,12 +12,12 @@ const measured = (name: string, kind: Measurement["kind"] = "distance"): Measure
   ],
 });
 
-it("keeps the names that the viewer has generated", () => {
+it("names of measurements that the viewer has generated are kept", () => {
   const list = [measured("Distance 1"), measured("Angle 3", "angle"), measured("Distance 2")];
   expect(untypedNames(list)).toEqual(list);
 });
 
-it("replaces names that a user has typed by unused ones", () => {
+it("names of measurements that a user has typed are replaced by unused ones", () => {
   const list = [measured("Doe, Jane"), measured("Distance 1"), measured("Distance 1b")];
   const names = untypedNames(list).map(({ name }) => name);
   expect(names).toEqual(["Distance 2", "Distance 1", "Distance 3"]);

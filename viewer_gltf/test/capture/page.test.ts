@@ -9,7 +9,7 @@ import { prepareStand } from "../support/browser/stand";
 
 const SHOTS = process.env.STEREOCELL_SHOTS;
 
-describeInChromium("what the page saves", () => {
+describeInChromium("a file that the page saves", () => {
   const stand = prepareStand({
     viewport: { width: 560, height: 240 },
     pixelRatio: 1,
@@ -42,7 +42,7 @@ describeInChromium("what the page saves", () => {
 
   it("is an image of four times the screen's size that shows the same, with a scale bar", async () => {
     const stage = await page().locator(".stage canvas").boundingBox();
-    await page().keyboard.press("0"); // from 2 to 4
+    await page().keyboard.press("0"); // the size of images, from 2 to 4 times the screen's
     const download = await saved('"');
     expect(download.suggestedFilename()).toBe("Fixture-picture.png");
     const png = await contentOf(download);

@@ -12,7 +12,7 @@ import { describeInChromium } from "../support/browser/skip";
 import { drop } from "../support/inbox/drop";
 import { askPython } from "../support/python";
 
-describeInChromium("an image that is looked at before it is built", () => {
+describeInChromium("an image that is previewed before it is built", () => {
   if (!existsSync(STEREOCELL)) {
     it.skip("needs Python");
     return;

@@ -14,7 +14,7 @@ import { DIST } from "../support/browser/stand";
 /** Share of pixels that may differ, in addition to those that blend differently each time they are drawn. */
 const SAME = 0.002;
 
-describeInChromium("the words about a visit without a network", () => {
+describeInChromium("the announcements about a visit without a network", () => {
   let root: string;
   let host: Host;
   let browser: Browser;
@@ -99,7 +99,7 @@ describeInChromium("the words about a visit without a network", () => {
     expect(await announced()).toEqual([]); // an earlier visit has announced it
   });
 
-  it("name the number of kept tiles; elsewhere the page reports that it is offline, until it is online", async () => {
+  it("name the number of kept tiles; at other tiles the page reports that it is offline, until it is online", async () => {
     const [volume] = (await viewer.snapshot()).volumes;
     await expect.poll(offline).toBe("partly");
     const other = (await tiles()).find((tile) => tile !== volume.tile) ?? "";

@@ -59,7 +59,7 @@ describeInChromium("by gaze alone", () => {
               if (!regions().some(isNew) && pages > 3) break;
             }
           };
-          /** The page of a channel or lamp, opened from the colours that a glance at its swatch shows. */
+          /** Tries the page of a channel or lamp, to which the colours lead that its swatch shows. */
           const walkGroup = (swatch: string) => {
             const more = swatch.replace("/open", "/more");
             hands.gazeFor(swatch, 0.6);

@@ -26,17 +26,17 @@ type Tried = Readonly<{ name: string; announced: string; changes: boolean; fault
 describeInChromium("a key that is pressed by accident", () => {
   const stand = prepareStand({ viewport: { width: 640, height: 480 }, isBlind: true });
 
-  /** Presses each key once and takes it back. `changes`: the key has changed something. */
+  /** Presses each key once and undoes it. `changes` of a result: the key has changed something. */
   const tryAll = (names: readonly string[]) =>
     stand.viewer.page.evaluate(async (names): Promise<Tried[]> => {
       const line = document.querySelector<HTMLElement>("[data-announcement]");
       if (line === null) throw new Error("the page has no line");
-      /** Loaded data is not a change by the user. */
+      /** Leaves out loaded data, which is not a change by the user. */
       const comparable = (key: string, value: unknown) => {
         if (key === "transfer2d") return undefined;
         return typeof value === "number" ? value.toFixed(5) : value;
       };
-      /** The state, the camera and the panel. */
+      /** Returns the state, the camera and the open parts of the panel as text, to compare by. */
       const now = () => {
         const { state, look } = window.stereocell?.snapshot() ?? {};
         const panel = document.querySelector(".panel");

@@ -105,7 +105,7 @@ const ALL: Partial<TraceSettings> = {
   sharpness: 0.9,
 };
 
-describeInChromium("what comes after the light", () => {
+describeInChromium("the adjustments after path tracing", () => {
   const { call } = prepareBarePage<Harness>(
     new URL("../support/pathtrace/harness.ts", import.meta.url),
   );
@@ -123,7 +123,7 @@ describeInChromium("what comes after the light", () => {
     ["all of them", ALL],
   ] as const;
   it.each(sweep(settings, ([, each]) => each === PLAIN || each === ALL))(
-    "is %s",
+    "change each pixel as computed here: %s",
     async (_, settings) => {
       const found = await gather(settings);
       const expected = expectedOf(found, { ...settings } as TraceSettings);
@@ -140,14 +140,14 @@ describeInChromium("what comes after the light", () => {
     },
   );
 
-  it("has no effect if it is off, and never changes the gathered light", async () => {
+  it("have no effect if they are off, and never change the gathered light", async () => {
     const off = await gather({ ...ALL, isPostOn: false });
     const plain = await gather(PLAIN);
     expect(off.picture).toEqual(plain.picture);
     expect(off.sums).toEqual(plain.sums);
   });
 
-  it("removes noise from a frame with few samples", async () => {
+  it("remove noise from a frame with few samples", async () => {
     const pixels = 48;
     const { picture: many } = await gather(PLAIN, { pixels, passes: 256 });
     const apart = (picture: readonly number[]) =>

@@ -53,7 +53,7 @@ for (const { name, bundle, channels, solid } of sweep(CASES, ({ name }) => name 
       const stand = prepareStand({ bundle, viewport: VIEWPORT, pixelRatio: 1 });
 
       for (const channel of sweep(channels, (each) => each === channels[0])) {
-        it(`${channel} has the colour of its surface`, async () => {
+        it(`the volume of ${channel} has the colour of its surface`, async () => {
           const at = async (mode: string) => {
             const look = solid === null ? "" : `&l=${channel}:t${solid}`;
             const link = `v=1&cut=none&c=${channel}${look}`;

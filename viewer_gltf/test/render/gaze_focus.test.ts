@@ -56,7 +56,7 @@ describeInChromium("a channel without a surface", () => {
   }
 });
 
-describeInChromium("surface or volume", () => {
+describeInChromium("the representation of the specimen", () => {
   const stand = prepareStand({ viewport: VIEWPORT, pixelRatio: 1 });
 
   async function pictureOf(query: string): Promise<Picture> {

@@ -141,7 +141,7 @@ describeInChromium("slices", () => {
   });
 });
 
-describeInChromium("planes in the specimen", () => {
+describeInChromium("slices that are shown as quads in the specimen", () => {
   const viewport = { width: 480, height: 272 };
   const stand = prepareStand({ viewport });
 

@@ -33,14 +33,17 @@ def layout_of(source: Path) -> StackLayout:
 
 
 def by_dicom2nifti(files: list[Path]) -> NDArray[np.float64]:
-    """(column, row, slice) to LPS; rows and columns as in the files, without flips."""
+    """Return dicom2nifti's affine, from (column, row, slice) to LPS, without flips."""
     headers = common.sort_dicoms([pydicom.dcmread(file) for file in files])
     affine, _ = common.create_affine(headers)
     return RAS_TO_LPS @ affine
 
 
 def by_itk(files: list[Path]) -> NDArray[np.float64]:
-    """(column, row, slice) to LPS; the files are sorted by position along the normal."""
+    """Return ITK's affine, from (column, row, slice) to LPS.
+
+    files  sorted by their positions along the slices' normal
+    """
     image = sitk.ReadImage([str(file) for file in files] if len(files) > 1 else str(files[0]))
     affine = np.eye(4)
     affine[:3, :3] = np.reshape(image.GetDirection(), (3, 3)) * image.GetSpacing()
@@ -49,9 +52,9 @@ def by_itk(files: list[Path]) -> NDArray[np.float64]:
 
 
 def by_nibabel(file: Path) -> NDArray[np.float64]:
-    """(row, column, slice) to LPS of an enhanced file."""
+    """Return nibabel's affine of an enhanced file, from (row, column, slice) to LPS."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it warns that its DICOM part is experimental
+        warnings.simplefilter("ignore")  # nibabel warns that its DICOM part is experimental
         from nibabel.nicom.dicomwrappers import wrapper_from_file
     return np.asarray(wrapper_from_file(str(file)).affine, np.float64)
 
@@ -66,12 +69,15 @@ def along_normal(files: list[Path]) -> list[Path]:
 
 
 def to_ours(affine: NDArray[np.float64]) -> NDArray[np.float64]:
-    """From (column, row, slice) to our (slice, row, column)."""
+    """Convert an affine from (column, row, slice) to one from our (slice, row, column)."""
     return affine[:, [2, 1, 0, 3]]
 
 
 def difference(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> float:
-    """The largest difference of any entry, after a stack of the opposite order is turned."""
+    """Return the largest difference of any entry of two affines, in mm.
+
+    If the other program stacks the slices in the opposite order, its affine is reversed first.
+    """
     theirs = theirs.copy()
     if theirs[:3, 0] @ ours[:3, 0] < 0:
         theirs[:3, 3] += (SHAPE[0] - 1) * theirs[:3, 0]

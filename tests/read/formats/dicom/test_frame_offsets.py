@@ -24,7 +24,10 @@ SCALING = 0.25
 
 
 def write_dose(path: Path, affine: np.ndarray[Any, Any], offsets: str = "relative") -> Path:
-    """Write the scene as doses; offsets are relative to the first plane, or positions along z."""
+    """Write the scene as RT Dose.
+
+    offsets  "relative": distances of the planes from the first; "absolute": positions along z
+    """
     stored = np.rint(sample(affine, SHAPE) / SCALING).astype(np.uint32)
     ds = image(stored[0], affine, 0, slope=None)
     ds.PixelData = stored.tobytes()

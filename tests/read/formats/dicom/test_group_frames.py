@@ -52,7 +52,7 @@ def test_stacks_of_an_enhanced_image_are_separate_series(tmp_path: Path, shift_m
 
 
 def alternating(name: str, values: list[Any]) -> Any:
-    """Return a change that alternates between values, in the order of instance numbers."""
+    """Return a function that sets an element to the values in turn, by instance number."""
 
     def change(ds: pydicom.Dataset) -> None:
         setattr(ds, name, values[int(ds.InstanceNumber) % len(values)])

@@ -27,7 +27,7 @@ BATCHES: dict[str, Batch] = {
 
 
 def batched(batch: Batch, *names: str, **values: Any) -> Change:
-    """Return a change that gives each batch separate UIDs."""
+    """Return a function that sets the elements `names` to one UID for each batch of slices."""
 
     def change(ds: pydicom.Dataset) -> None:
         for name in names:

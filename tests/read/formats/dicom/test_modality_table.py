@@ -19,7 +19,7 @@ from support.dicom_series import write_series
 
 
 def table(values: Any, first: int = 0, depth: int = 16, vr: str = "US") -> list[Dataset]:
-    """Return the sequence of one table."""
+    """Return a Modality LUT Sequence of one table; its first entry is for the value `first`."""
     item = Dataset()
     count = len(values) % (1 << 16)
     item.add_new("LUTDescriptor", "SS" if first < 0 else "US", [count, first, depth])
@@ -38,7 +38,7 @@ def write(folder: Path, change: Callable[[Dataset], None], **options: Any) -> li
 
 
 def greys_of_pydicom(paths: list[Path]) -> list[int]:
-    """Return the sorted values of all slices."""
+    """Return the sorted values of all voxels of the slices, as pydicom applies the table."""
     datasets = [pydicom.dcmread(path) for path in paths]
     return sorted(int(v) for ds in datasets for v in apply_modality_lut(ds.pixel_array, ds).flat)
 

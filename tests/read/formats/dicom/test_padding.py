@@ -22,7 +22,7 @@ OUTSIDE = np.hypot(*np.meshgrid(np.arange(30) - 14.5, np.arange(26) - 12.5, inde
 
 
 def measured() -> NDArray[np.int16]:
-    """Stored values of CT: one is 24 (-1000 HU), all others are 30 or more."""
+    """Return stored values of a CT: one voxel is 24 (-1000 HU), all others are 30 or more."""
     values = np.random.default_rng(0).integers(30, 1500, SHAPE).astype(np.int16)
     values[2, 15, 13] = 24
     return values
@@ -45,7 +45,10 @@ def padded(stored: NDArray[Any], value: int) -> NDArray[Any]:
 
 
 def as_stored(dataset: Dataset) -> NDArray[Any]:
-    """Voxels (slice, row, column): canonical axes are (anterior, inferior, left)."""
+    """Return voxels as the files store them, (slice, row, column).
+
+    The axes of a dataset are canonical: (anterior, inferior, left).
+    """
     return whole(dataset).transpose(1, 0, 2)[::-1, ::-1]
 
 

@@ -26,7 +26,7 @@ AFFINE = grid(shape=SHAPE, spacing=SPACING)
 
 
 def masks() -> NDArray[np.uint8]:
-    """Two segments that overlap in every plane: (slices, rows, columns, segments)."""
+    """Return two segments that overlap in every plane, (slices, rows, columns, segments)."""
     both = np.zeros((*SHAPE, 2), np.uint8)
     both[:, 1:5, 1:4, 0] = 1
     both[:, 3:8, 2:6, 1] = 1
@@ -35,14 +35,14 @@ def masks() -> NDArray[np.uint8]:
 
 
 def apart() -> NDArray[np.uint8]:
-    """The same segments without their overlap: the first one keeps it."""
+    """Return the segments of `masks` without overlap: common voxels belong to the first."""
     voxels = masks()
     voxels[..., 1] &= 1 - voxels[..., 0]
     return voxels
 
 
 def numbered(voxels: NDArray[Any]) -> NDArray[Any]:
-    """The label map of segments that don't overlap."""
+    """Return the label map of segments that don't overlap, with labels from 1 on."""
     return voxels @ np.arange(1, voxels.shape[-1] + 1, dtype=np.uint8)
 
 
@@ -53,7 +53,7 @@ def labels_of(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
 def on_our_grid(
     voxels: NDArray[Any], dataset: read.Dataset, affine: NDArray[np.float64] = AFFINE
 ) -> NDArray[Any]:
-    """Return the voxels of stored planes at the places of the dataset's voxels."""
+    """Return the stored voxels (slice, row, column) at the positions of the dataset's voxels."""
     step = np.linalg.inv(affine)
     index = np.rint(lps_mm(dataset) @ step[:3, :3].T + step[:3, 3]).astype(int)
     return voxels[index[..., 0], index[..., 1], index[..., 2]]

@@ -4,7 +4,7 @@ import { FrameBudget } from "./frame_budget";
 /** A context without timer queries for the GPU. */
 const gl = { getExtension: () => null } as unknown as WebGL2RenderingContext;
 
-it("reports late frames only while a moving view is slower than the display", () => {
+it("the frame budget reports late frames only while a moving view is slower than the display", () => {
   const pace = new FrameBudget(gl);
   const draw = (isMoving: boolean, interval_ms: number, frames: number) => {
     for (let i = 0; i < frames; i++) {

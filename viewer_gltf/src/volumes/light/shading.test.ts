@@ -142,7 +142,7 @@ describe("the grid of cells", () => {
     const through = throughCells(grid, [tile(9, 51)], null);
     const [n] = grid.size;
     expect(through[(8 * n + 8) * n + 8]).toBeCloseTo(0.8 ** (2 * grid.edge), 5);
-    expect(through[0]).toBe(1); // in the margin
+    expect(through[0]).toBe(1); // a cell at the corner of the grid, outside the tile
     const both = throughCells(grid, [tile(9, 51), tile(9, 51)], null);
     expect(both[(8 * n + 8) * n + 8]).toBeCloseTo(1 - 2 * (1 - 0.8 ** (2 * grid.edge)), 5);
   });

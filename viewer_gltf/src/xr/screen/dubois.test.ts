@@ -18,7 +18,7 @@ it.each(["#000000", "#404040", "#808080", "#c0c0c0", "#ffffff"])(
   },
 );
 
-it("gives the left eye's light to red, and the right eye's to green and blue", () => {
+it("an anaglyph gives the left eye's light to red, and the right eye's to green and blue", () => {
   const [red, ...cyan] = times(LEFT, [1, 1, 1]);
   expect(red).toBeGreaterThan(1);
   expect(Math.max(...cyan)).toBeLessThan(0);

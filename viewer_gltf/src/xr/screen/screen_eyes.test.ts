@@ -33,23 +33,23 @@ it.each([
   [-0.7, 1.8],
   [0.1, 0.6],
   [-0.2, 3.1],
-])("gives a point at z = %f the parallax of two eyes at z = %f", (z, camera_z) => {
+])("a point at z = %f has the parallax of two eyes at z = %f", (z, camera_z) => {
   // similar triangles: eye distance * (1 / distance - 1 / distance of the plane), in focal lengths
   const apart_m = (PUPILS_M * camera_z) / 1.8;
   const expected = FOCAL_PX * apart_m * (1 / (camera_z - z) - 1 / camera_z);
   expect(disparity_px(new Vector3(0.3, -0.1, z), camera_z)).toBeCloseTo(expected, 6);
 });
 
-it("has no parallax in the plane through the focus, or if both eyes are in one place", () => {
+it("a point has no parallax in the plane through the focus, or if both eyes are in one place", () => {
   expect(disparity_px(new Vector3(-0.4, 0.2, 0), 1.1)).toBeCloseTo(0, 9);
   expect(disparity_px(new Vector3(-0.4, 0.2, 0.4), 1.1, 0)).toBeCloseTo(0, 9);
 });
 
-it("keeps the parallax behind the screen below a thirtieth of the width", () => {
+it("the parallax behind the screen stays below a thirtieth of the width", () => {
   expect(-disparity_px(new Vector3(0, 0, -15), 1.8)).toBeLessThan(WIDTH / 30);
 });
 
-it("gives each eye its half of the render target", () => {
+it("each eye has its half of the render target", () => {
   const eyes = new ScreenEyes();
   eyes.sync(cameraAt(1), new Vector3(), PUPILS_M, [WIDTH, HEIGHT]);
   expect(eyes.pairs.map(([, viewport]) => viewport.toArray())).toEqual([

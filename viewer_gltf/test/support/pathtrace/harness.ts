@@ -64,11 +64,11 @@ export type Run = Readonly<{
   batches?: number;
 }>;
 
-/** Rows are ordered from the bottom. */
+/** Results of a run. Pixels are ordered row by row, from the bottom. */
 export type Gathered = Readonly<{
-  /** r, g, b and coverage. */
+  /** For each pixel, sums over its samples: r, g, b and coverage. */
   sums: number[];
-  /** Sums of squared luminance, samples, distance and openness. */
+  /** For each pixel, further sums: squared luminance, number of samples, distance and openness. */
   moments: number[];
   picture: number[];
   /** For each batch, the mean over the frame of what its passes added to the sums. */

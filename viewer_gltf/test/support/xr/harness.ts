@@ -316,8 +316,9 @@ class Stand {
 }
 
 /**
- * Returns the pixels that remain of two planes side by side with a material that cuts everything.
- * The left plane is not part of the specimen. Both orders of drawing are tested.
+ * Draws two rectangles side by side with a material whose clip plane removes everything. Only the
+ * left one is exempt, because it is not part of the specimen. Returns for both orders of drawing
+ * the share of the left half's pixels that are drawn, and the number of pixels drawn on the right.
  */
 function leftOfTheUncut(): readonly (readonly [number, number])[] {
   const renderer = new WebGLRenderer();
