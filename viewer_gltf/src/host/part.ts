@@ -93,7 +93,10 @@ export type Tap = Readonly<{
  */
 export type TapAnswer = "used" | "shared" | null;
 
-/** Functions by the name of the command. A function that returns false leaves the command to others. */
+/**
+ * Functions by the name of the command. A function that returns false leaves the command to the
+ * other parts.
+ */
 export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;
 
 /**
@@ -123,7 +126,7 @@ export interface Part {
   readonly id: string;
   /** Called once, when all parts have been made. */
   begin?(): void;
-  /** Called once, when the view of the address is open. */
+  /** Called once, when the viewer has the settings and the camera of the page's address. */
   afterOpening?(): unknown;
   /** Called once, when the overview is on screen. Parts load here what the first view does not need. */
   afterOverview?(): unknown;
@@ -132,7 +135,9 @@ export interface Part {
   /** Advances animations, before each frame. */
   advance?(frame: FrameView): void;
   readonly scene?: PartScene;
-  /** Returns the planes in front of which the specimen is cut away for an eye, um. */
+  /**
+   * Returns clip planes for an eye (um). Everything between the eye and such a plane is not drawn.
+   */
   cutBefore?(eye: Vec3): readonly ClipPlane[] | undefined;
   /** Returns the nearest hit of a ray (um); null: none. */
   pick?(ray: Ray): Hit | null;
@@ -168,7 +173,7 @@ export type PartDefinition = Readonly<{
   commands?: readonly Command[];
   /** Settings and actions that the part adds to the state. */
   settings?: PartSettings;
-  /** Buttons that solve the part's refusals. */
+  /** By the text of a refusal, the button that removes its cause. */
   remedies?: Remedies;
   create: (host: PartHost) => Part;
 }>;

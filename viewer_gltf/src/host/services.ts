@@ -41,7 +41,9 @@ export interface ObjectMaps {
    * null: not loaded yet.
    */
   linked(channel: string, view: ObjectView): Readonly<{ text: string; leftOut: number }> | null;
-  /** Rows of the shown objects, by channel. */
+  /**
+   * For each channel, the numbers of its objects' rows in the table; only objects that are shown.
+   */
   readonly rowsShown: ReadonlyMap<string, readonly number[]>;
   /** Returns the number of a channel's objects that are shown; null: their table is not loaded yet. */
   shownCount(channel: string): number | null;

@@ -51,7 +51,7 @@ export class Steps {
     return this.history.future[0]?.name ?? null;
   }
 
-  /** Makes a step of a move of the camera since the last step, if there was one. */
+  /** If the camera has moved since the last step, adds an undo step for that move. */
   note(): void {
     const moment = this.now();
     if (moment.isInStereo || isSame(moment.camera, this.seenFrom)) return;
@@ -75,7 +75,7 @@ export class Steps {
     return this.take(redone(this.history, moment));
   }
 
-  /** The newest step, which marks a place in the history; null: none. */
+  /** The newest step, as a mark from which `since` counts; null: there are no steps. */
   get newest(): object | null {
     return this.history.past.at(-1) ?? null;
   }

@@ -85,7 +85,10 @@ export class StereoTransition {
     this.specimen.moveTo(pose, this.navigation.camera.position);
   }
 
-  /** The flat camera as a hand that holds the point it turns around. */
+  /**
+   * Pose of an imagined hand at the point that the flat camera turns around, with the camera's
+   * orientation.
+   */
   private get screenHold(): HandPose {
     const { target, object } = this.navigation.controls;
     return { position: target, orientation: object.quaternion };

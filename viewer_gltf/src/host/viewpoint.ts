@@ -95,7 +95,10 @@ export class Viewpoint {
     return isSameCameraPose(look, this.navigation);
   }
 
-  /** The present named view; null: the user has moved the camera. */
+  /**
+   * The named view in which the camera is now, such as "front"; null: the user has moved the
+   * camera.
+   */
   get standing(): NamedView | null {
     return this.navigation.namedView;
   }

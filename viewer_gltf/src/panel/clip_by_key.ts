@@ -24,7 +24,9 @@ type Turn = (typeof TURNS)[number];
  */
 export type ClipPart = BoxHandleId | "plane-middle" | Turn;
 
-/** Step of a key, as a share of the edge of the shown box. */
+/**
+ * Distance that one press of a key moves a face or the plane, as a share of the shown box's edge.
+ */
 const STEP = 0.02;
 const STEP_RAD = Math.PI / 36;
 const AXIS_NAMES = ["x", "y", "z"] as const;
@@ -47,7 +49,10 @@ export function handleOf(clipPart: ClipPart): HandleId {
   return isTurn(clipPart) ? "plane-tip" : clipPart;
 }
 
-/** @param steps negative: backwards @returns null at the limit */
+/**
+ * @param steps number of steps; negative: backwards @returns the cuts after the move; null: the
+ * part is at its limit
+ */
 export function moveClipPart(
   clipPart: ClipPart,
   steps: number,

@@ -117,7 +117,10 @@ type Base = Readonly<{
 
 export type Toggle = Base &
   Readonly<{ kind: "toggle"; value: boolean; to: (value: boolean) => Request }>;
-/** `value` is 0..1, in `steps` steps; `text` is the value in its own unit. */
+/**
+ * `value` is the knob's position, 0..1. An arrow key moves it by 1 / `steps`. `text` is the
+ * parameter's value with its unit.
+ */
 export type Slider = Base &
   Readonly<{
     kind: "slider";
@@ -126,7 +129,7 @@ export type Slider = Base &
     text: string;
     to: (value: number) => Request;
   }>;
-/** Two ends of a range, each with a value as a slider has it. */
+/** A slider with two knobs for the ends of a range, each with a position 0..1. */
 export type Window = Base &
   Readonly<{
     kind: "window";
@@ -203,13 +206,16 @@ export type HistogramEditor = Base &
     kind: "histogram";
     /** null: not loaded yet. */
     histogram: Histogram | null;
-    /** The range of the histogram's values that fills the width. */
+    /** The range of intensities (0..1) that fills the width of the drawing. */
     window: readonly [number, number];
     shapes: Shapes;
     selected: number | null;
     /** Linear colour of the channel. */
     color: Rgb;
-    /** Lower and upper end of the values, and the steepest gradient. */
+    /**
+     * Labels of the axes: the intensity at the left and at the right end, and the gradient
+     * magnitude at the top.
+     */
     texts: readonly [string, string, string];
     /** @param reach largest distance to a corner or an edge */
     press: (at: HistogramPoint, reach: HistogramPoint) => Request;

@@ -22,7 +22,10 @@ export type Facts = Readonly<{
   frame_ms: number | null;
   settings: QualitySettings | null;
   triangles: number;
-  /** Finest level of the volumes on screen; 0 is the finest of all. null: no volume. */
+  /**
+   * Finest resolution level (mip level) of the volumes on screen, where 0 is full resolution; null:
+   * no volume is on screen.
+   */
   volumeLevel: number | null;
   /** Samples per pixel of the path-traced image; null: path tracing is off. */
   samples: number | null;
@@ -255,7 +258,10 @@ function volumesText(level: number): string {
   return level === 0 ? "in full detail" : `at 1/${2 ** level} detail`;
 }
 
-/** Names the shown forms, and whether they are complete. */
+/**
+ * Returns the status line: whether surfaces or volumes are shown, and whether they are loaded
+ * completely.
+ */
 function statusOf({ channels, mode, isolated, tiles }: ViewerState, facts: Facts): string {
   const { samples, isLoading } = facts;
   const isUnfinished = tiles.some((tile) => tile.isUnfinished);

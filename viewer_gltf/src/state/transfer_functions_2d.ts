@@ -79,7 +79,10 @@ export function withShapes<F extends Functions>(functions: F, name: string, shap
 
 const rounded = (x: number) => Math.round(x * STEPS) / STEPS;
 
-/** Rounds a range to the lattice, and keeps at least its least size. */
+/**
+ * Rounds both ends of a range to multiples of 1 / STEPS, with at least a smallest distance between
+ * them.
+ */
 function roundedRange([low, high]: Range, least: number): Range {
   const steps = Math.ceil(least * STEPS - 1e-9);
   const from = Math.min(Math.round(low * STEPS), STEPS - steps);

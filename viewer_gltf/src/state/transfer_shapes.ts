@@ -110,7 +110,7 @@ function soften(depth: number, softness: number): number {
   return clamp(depth / softness, 0, 1);
 }
 
-/** Returns the intensities between which a shape lies at a gradient magnitude. */
+/** Returns the lowest and highest intensity that a shape covers at one gradient magnitude. */
 function sidesAt(shape: Shape, gradient: number): Range {
   const [low, high] = shape.values;
   if (shape.kind === "rectangle") return shape.values;

@@ -29,7 +29,10 @@ export type ChannelState = Functions &
     turn: number;
     /** Colour in the bundle. */
     original: Rgb;
-    /** Part of the intensities, 0..1, that the transfer function is stretched over. */
+    /**
+     * Lowest and highest intensity (0..1) of the range over which the transfer function is
+     * stretched.
+     */
     window: readonly [number, number];
     hasSurface: boolean;
     /** Whether the channel is a label map: objects with closed surfaces, and no volume. */
@@ -58,7 +61,7 @@ export type ViewerState = Settings &
   Readonly<{
     channels: readonly ChannelState[];
     tiles: readonly TileState[];
-    /** Views of the channels that are label maps. */
+    /** How the objects of each label map are shown, by channel. */
     objects: ObjectViews;
     /** Tile nearest to the specimen's centre. */
     middle: string;
@@ -66,7 +69,7 @@ export type ViewerState = Settings &
     selected: string | null;
     /** The only tile that is shown; null: all tiles are. */
     isolated: string | null;
-    /** Part of the specimen that the cuts leave, um. */
+    /** Clip box and clip plane, um, which cut away parts of the specimen. */
     clip: Clip;
     /** Views that a video goes through. */
     keptViews: readonly KeptView[];

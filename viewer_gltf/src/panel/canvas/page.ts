@@ -51,7 +51,7 @@ export type Page = Readonly<{
   title: string;
   marks: readonly Mark[];
   regions: readonly Region[];
-  /** Number of the page, from 0, and of all pages. */
+  /** Number of the shown page, counted from 0, and the number of all pages. */
   page: number;
   count: number;
   /** Where *Back* leads, one level up; null: this is the list of sections. */
