@@ -237,8 +237,8 @@ export class FrameLoop {
 }
 
 /**
- * Returns the number of steps per ray that the user has set for path tracing, for the march that is
- * shown until the paths are traced. null: as many as the time budget of a frame allows.
+ * Returns the number of steps per ray of the march that is shown until path tracing has an image.
+ * The user sets it; null: as many as the time budget of a frame allows.
  */
 function stepsOf({ mode, trace: { steps } }: ViewerState): number | null {
   return isTraced({ mode }) && steps > 0 ? Math.min(REST_STEPS, Math.ceil(steps)) : null;

@@ -25,14 +25,17 @@ export type Choices = Readonly<
     series: string;
     background: string;
     title: string;
-    /** x, y, z */
+    /** Voxel spacing along x, y, z. */
     spacing_um: readonly number[];
   }>
 >;
 
 export type Command = "pause" | "continue" | "cancel";
 
-/** Progress of an upload. */
+/**
+ * An upload that has begun: the ID of its item, and the number of bytes that the server already
+ * has.
+ */
 export type Begun = Readonly<{ id: string; offset: number }>;
 /** The answer to a piece. `offset` is the number of bytes that have arrived; null: the server does not state it. */
 export type PieceAnswer = Readonly<{ status: number; offset: number | null; line: string }>;

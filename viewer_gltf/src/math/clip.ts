@@ -8,7 +8,10 @@ import { AXES, along, dot, type Ray, type Vec3, withPart } from "./vec3";
  * to the removed side.
  */
 export type ClipPlane = Readonly<{ normal: Vec3; offset_um: number }>;
-/** The kept part; null: not clipped. `corner`: points beyond all of these planes are removed. */
+/**
+ * The cuts, um, world. The points inside `box` and behind `plane` are kept; null means that this
+ * cut is off. Points beyond all planes of `corner` are removed, too.
+ */
 export type Clip = Readonly<{
   box: Box | null;
   plane: ClipPlane | null;

@@ -24,7 +24,7 @@ import {
 } from "./probe";
 import { availableLevel, TexelCache } from "./texel_cache";
 
-/** Largest number of texels of the level in which the reader looks for a ray's hit. */
+/** Largest number of texels of the mip level in which the reader looks for a ray's hit. */
 const PROBED_TEXELS = 2 * 1024 * 1024;
 
 export type ReadingOptions = Readonly<{

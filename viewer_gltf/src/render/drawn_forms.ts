@@ -69,13 +69,13 @@ export type TraceScene = Readonly<{
 /** A ray-marched frame of the same view, linear and premultiplied. */
 export type MarchedFrame = Readonly<{
   image: Texture;
-  /** Its pixels per pixel of the frame buffer. */
+  /** Pixels of the marched frame for each pixel of the frame buffer, along an edge. */
   scale: number;
 }>;
 
 /** How much work the path tracing of a frame may take. */
 export type TracePace = Readonly<{
-  /** Share of the pixels that the frame's budget allows, 0 to 1. */
+  /** Pixels that the time budget allows for each pixel of the frame, along an edge, 0 to 1. */
   resolution: number;
   isMoving: boolean;
   /** Samples per pixel. */

@@ -47,10 +47,10 @@ export type Drawn = Readonly<{
 
 /** The quality of one frame. */
 export type FramePace = Readonly<{
-  /** Pixels of the volumes per pixel of the frame, 0 to 1. */
+  /** Pixels of the marched image for each pixel of the frame, along an edge, 0 to 1. */
   resolution: number;
   isMoving: boolean;
-  /** Traced samples per pixel. */
+  /** Path-traced samples that are added to each pixel in this frame. */
   passes: number;
   /**
    * Whether edges are anti-aliased, which takes a third of a frame of surfaces on a software

@@ -20,7 +20,10 @@ class SharePart implements Part, Links {
   private code: LinkWriter | null = null;
   /** The view that the address has opened; null until it is open. */
   private opened: Opened | null = null;
-  /** null if the address does not follow the view. */
+  /**
+   * Keeps the page's address equal to a link to the view; null if the address does not follow the
+   * view.
+   */
   private addressBar: AddressBar | null = null;
 
   constructor(private readonly host: PartHost) {}

@@ -7,7 +7,7 @@
  */
 import { SourceError } from "./source_error";
 
-/** Along z, y and x. */
+/** Three numbers of a volume: along z, y and x. */
 export type Triple = readonly [number, number, number];
 
 /** Largest number of shown voxels of all channels together; 8 MB of textures. */

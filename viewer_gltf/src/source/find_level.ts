@@ -15,7 +15,8 @@
 const MAX_STEPS = 200;
 
 /**
- * Returns the level, 0..1 in the window; null for a constant channel.
+ * Returns the intensity at which objects begin, as a share 0..1 of the window; null for a constant
+ * channel.
  *
  * @param histogram voxel counts over 0..1 in equal bins
  */

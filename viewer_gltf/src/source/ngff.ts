@@ -32,7 +32,7 @@ export type NgffChannel = Readonly<{
 export type NgffImage = Readonly<{
   /** Names of the axes, slowest first, in lower case: t, c, z, y, x in any order. */
   axes: readonly string[];
-  /** Finest first. */
+  /** Resolution levels of the pyramid, finest first. */
   levels: readonly NgffLevel[];
   /** The channels that the metadata describe; the image may have more. */
   channels: readonly NgffChannel[];

@@ -31,7 +31,7 @@ export type OpacityPoints = readonly (readonly [number, number])[];
 const LEVEL_PERCENTILE = 99;
 
 export type FunctionOptions = Readonly<{
-  /** Level at which the specimen begins, 0..1 in the window; null if unknown. */
+  /** Intensity at which the specimen begins, as a share 0..1 of the window; null if unknown. */
   level: number | null;
   /** The DICOM modality; empty for a microscope. */
   modality: "" | "CT" | "MR";

@@ -33,7 +33,7 @@ const CLOSED = { tile: null, faces: new Map<string, Face>() };
 export type SurfaceOptions = Readonly<{
   loader: SurfaceLoader;
   frame: SurfaceFrame;
-  /** For all channels together. */
+  /** Largest GPU memory and number of triangles for the surfaces of all channels together. */
   budget: Pick<MemoryBudget, "surfaces" | "triangles">;
   /** How far the volume of a tile and channel has faded in, 0 to 1. */
   presence: (tile: string, channel: string) => number;

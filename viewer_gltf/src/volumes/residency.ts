@@ -23,7 +23,7 @@ export type Resident = {
   wanted: WantedTile | null;
   /** 0 to 1. */
   presence: number;
-  /** Number of the request in which it was last wanted. */
+  /** Number of the request in which the tile was last wanted; larger is more recent. */
   turn: number;
 };
 
@@ -57,7 +57,7 @@ export class Residency {
     return resident;
   }
 
-  /** Bytes for each tile if this number of tiles is wanted. */
+  /** Returns the GPU memory, in bytes, that one tile may use if `wanted` tiles are needed. */
   share(wanted: number): number {
     return this.budget / (WITH_OLD_LEVEL * (wanted + KEPT_TILES));
   }

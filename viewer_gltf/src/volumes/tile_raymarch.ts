@@ -39,7 +39,7 @@ import { distanceInGrid } from "./blend_order";
 import { occupiedCorners } from "./occupied_bricks";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 
-/** Voxels. Shortest step. */
+/** Shortest step along a ray, in voxels. */
 const STEP_VOXELS = 1;
 /** Opacity, 0 to 1, at which a ray ends. */
 const OPAQUE = 0.99;
@@ -67,7 +67,10 @@ const ADDED = { ...OVER, blendDst: OneFactor };
 
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
-  /** All zeros, so that nothing is skipped, until the table is computed. */
+  /**
+   * Distance table by which rays skip empty bricks. Until it is computed, it is all zeros, so that
+   * nothing is skipped.
+   */
   private readonly skips: Uint8Array<ArrayBuffer>;
   private readonly occupancy: Data3DTexture;
   readonly tables: MarchTables;

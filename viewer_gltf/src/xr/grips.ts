@@ -35,7 +35,7 @@ const HOLD_M = 0.02;
 const HEAD_HOLD_S = 0.6;
 
 type Press = {
-  /** The target at which it was pressed, and the place of the hand. */
+  /** The target at which the button was pressed, and the place of the hand at that time. */
   readonly hit: TargetHit | null;
   readonly at: Vector3 | null;
   elapsed_s: number;

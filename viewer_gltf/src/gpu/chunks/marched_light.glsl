@@ -5,7 +5,7 @@ uniform sampler2D uMarched;  // premultiplied, linear; with ENCODED its colours 
 uniform highp sampler2D uSceneDepth;
 uniform int uEyeCount;
 uniform vec4 uEyes[2];  // each eye's part of the frame: x, y, width, height, pixels
-uniform vec4 uParts[2];  // each eye's part of uMarched, likewise
+uniform vec4 uParts[2];  // each eye's part of uMarched: x, y, width, height, pixels
 
 // Difference of depths that count as similar, as a share of the depth's distance to the far plane.
 const float ALIKE = 0.02;

@@ -4,7 +4,7 @@ precision highp float;
 
 uniform sampler2D uColor;  // linear, premultiplied
 uniform sampler2D uGuide;  // distance in lengths of the box's longest edge; 0: the pixel shows nothing
-uniform float uEdge;  // um
+uniform float uEdge;  // um: longest edge of the box
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
 uniform mat4 uToBox;  // the current view: from normalised device coordinates to um of the box
 uniform vec3 uEyeAt;

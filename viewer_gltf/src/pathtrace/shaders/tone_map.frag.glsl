@@ -9,7 +9,7 @@ uniform float uSharpness;  // 0: no sharpening
 uniform bool uIsFilmic;
 uniform vec3 uTone;  // turns of hue, factor to saturation, added lightness
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
-uniform sampler2D uGuide;  // samples
+uniform sampler2D uGuide;  // y: number of samples of a pixel
 uniform sampler2D uMarched;  // linear, premultiplied
 uniform float uRounds;  // samples that every pixel has
 uniform vec4 uMarchedPart;  // the eye's part of uMarched; width 0: nothing stands in

@@ -128,7 +128,10 @@ export class BrickCache {
     await finished(work);
   }
 
-  /** Runs a task; a database that is full or was removed counts as none. */
+  /**
+   * Runs a task on the database. Returns `none` if there is no database, or if it is full or was
+   * removed.
+   */
   private async safely<T>(none: T, work: (database: IDBDatabase) => Promise<T>): Promise<T> {
     if (this.database === null) return none;
     try {

@@ -62,8 +62,8 @@ export class SharpenedTile {
   }
 
   /**
-   * For each channel: data that was left out is invisible if nothing up to this intensity is
-   * visible.
+   * For each channel, an intensity, 0 to 255, or -1. The host leaves out bricks whose voxels are
+   * all at or below it. A transfer function that shows such voxels therefore needs other bricks.
    */
   get thresholds(): readonly number[] {
     return this.isSharp ? (this.finer?.thresholds ?? []) : [];
