@@ -51,11 +51,11 @@ export type StreamView = Readonly<{
 export interface Form {
   /** Loading progress of the overview of all tiles. */
   readonly overview?: Progress;
-  /** Whether all tiles of the first channel are shown. */
+  /** Whether all tiles of the first shown channel are on screen. */
   readonly hasFirst?: boolean;
   /** Whether some data of the frame is not drawn at all, not even at a coarse resolution. */
   readonly isIncomplete?: boolean;
-  /** Triangles on screen. */
+  /** Number of triangles that this form has on screen. */
   readonly triangles?: number;
   /** Surfaces that are translucent now. */
   readonly panes?: readonly BlendedScene[];

@@ -195,7 +195,7 @@ export class GpuDisplay implements Display {
 
   /** Makes new textures and timers after the graphics context was restored. */
   renew(): void {
-    this.forms.forget(); // textures that were made since the loss
+    this.forms.forget(); // drops textures that were made while the context was lost
     this.loop.renew();
     this.options.sync();
   }

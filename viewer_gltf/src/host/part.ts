@@ -64,7 +64,7 @@ export type FrameView = Readonly<{
 export type PartScene = Readonly<{
   /** Group in the space of the specimen: um, world. */
   group: Object3D;
-  /** Objects that are not in the depth pass. */
+  /** Objects that the depth pass leaves out, so that they do not hide volumes behind them. */
   overlays: readonly Object3D[];
   /** A number that changes when the part's opaque objects change; 0: it has none. */
   solid: number;
@@ -72,7 +72,7 @@ export type PartScene = Readonly<{
   isStanding: boolean;
 }>;
 
-/** The place where a ray hits a part. */
+/** The point where a ray hits something that a part of the viewer shows. */
 export type Hit = Probed &
   Readonly<{
     /** The object of a label map that is hit; absent: none. */
@@ -161,7 +161,7 @@ export interface Part {
   dispose(): void;
 }
 
-/** A part as it is registered. */
+/** The data by which a part of the viewer is registered, and the function that makes the part. */
 export type PartDefinition = Readonly<{
   id: string;
   keys?: readonly KeyGroup[];

@@ -49,7 +49,7 @@ export interface ObjectMaps {
   shownCount(channel: string): number | null;
 }
 
-/** Images of the view. */
+/** Makes images of the view. */
 export interface PosterMaker {
   /**
    * Makes an image of the screen, with a longest edge of at most `longest_px` pixels. Rejects with
@@ -82,7 +82,7 @@ export interface PagePanel {
   offer(words: string, label: string, act: () => void): void;
 }
 
-/** The buttons that solve a refusal. */
+/** Finds the button that removes the cause of a refusal. */
 export interface MessageButtons {
   /** Returns the button of a refusal; null: it has none. */
   buttonFor(refusal: string): Promise<Readonly<{ label: string; act: () => void }> | null>;

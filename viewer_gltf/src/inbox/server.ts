@@ -70,7 +70,7 @@ export class Server {
     await this.json("PUT", `items/${id}/choices`, choices);
   }
 
-  /** Returns the folder of the view, below this page. */
+  /** Requests a view of an item. Returns the folder of the view, below this page. */
   async look(id: string): Promise<string> {
     const answer = (await this.json("POST", `items/${id}/look`)) as { page?: unknown } | null;
     const page = pageOf(answer?.page);

@@ -177,7 +177,7 @@ export type Button = Base &
 export type MapTile = Readonly<{
   id: string;
   name: string;
-  /** Name of the tile where it stands alone. */
+  /** Name of the tile with a capital letter, for places that show nothing else beside it. */
   title: string;
   row: number;
   column: number;

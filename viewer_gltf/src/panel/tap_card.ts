@@ -21,7 +21,10 @@ export type Tapped = Readonly<{
 
 export type TapCardContent = Readonly<{
   title: string;
-  /** Where the place is; "": nothing to add. */
+  /**
+   * Second line of the card: channel and tile of the tapped point, if the title does not name them;
+   * may be "".
+   */
   subtitle: string;
   controls: readonly Control[];
 }>;

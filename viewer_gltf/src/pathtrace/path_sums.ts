@@ -51,7 +51,7 @@ export class PathSums {
     return this.sums[this.drawn % 2];
   }
 
-  /** Starts a frame of another view. */
+  /** Starts to sum up samples of another view. Earlier samples no longer count. */
   begin(): void {
     this.samples = this.rested = this.turn = 0;
   }

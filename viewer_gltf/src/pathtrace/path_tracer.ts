@@ -128,7 +128,7 @@ export class Tracer {
     this.begin();
   }
 
-  /** Starts a frame of another view. */
+  /** Starts to gather samples of another view. */
   private begin(): void {
     this.anchors = [];
     this.sums.begin();

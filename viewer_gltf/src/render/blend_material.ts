@@ -198,7 +198,8 @@ export class BlendedSurface {
       if (object instanceof Mesh) meshes.push(object);
     });
     this.meshes = meshes;
-    this.depth.transparent = true; // drawn in one order with the colours
+    // makes three.js sort the depth pass together with the surfaces' colours
+    this.depth.transparent = true;
     this.depthMeshes = meshes.map((mesh) => {
       const depthMesh = new Mesh(mesh.geometry, this.depth);
       depthMesh.renderOrder = -DEPTH_AHEAD;
@@ -226,7 +227,7 @@ export class BlendedSurface {
     Object.assign(depth.uniforms, part.uniforms);
     depth.vertexShader = includeChunks(depthVertex, { ...CHUNKS, ...part.chunks });
     for (const material of [...this.materials, depth]) material.needsUpdate = true;
-    // the depth pass discards the same fragments
+    // the pass that writes depth must not replace these materials, because they discard fragments
     for (const material of this.materials) material.allowOverride = false;
   }
 

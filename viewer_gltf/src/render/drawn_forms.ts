@@ -78,7 +78,10 @@ export type TracePace = Readonly<{
   /** Pixels that the time budget allows for each pixel of the frame, along an edge, 0 to 1. */
   resolution: number;
   isMoving: boolean;
-  /** Samples per pixel. */
+  /**
+   * Path-traced samples that are added to each pixel; below 1, the share of the pixels that get
+   * one.
+   */
   passes: number;
   /** The ray march of the same view, shown until path tracing has an image; null: none. */
   standIn: MarchedFrame | null;

@@ -94,7 +94,7 @@ export class FrameRenderer {
   };
   /** Target of the whole frame in linear light, before it is encoded. */
   private readonly light: WebGLRenderTarget;
-  /** Target without anti-aliasing. */
+  /** Target of a frame in linear light without anti-aliasing, for moving views that are late. */
   private readonly draft: WebGLRenderTarget;
   private readonly encode = new EncodePass();
   /** Fades from the frame before a jump to the frame after it. */

@@ -14,7 +14,7 @@ export const MOVE_S = 0.4;
 const FARTHEST_M = 5;
 
 export class Specimen {
-  /** Its children are in um, world. */
+  /** The specimen in the scene; the coordinates of its children are in um of the world. */
   readonly group = new Group();
   pose: SpecimenPose;
   isMoved = false;

@@ -65,7 +65,7 @@ export type ViewerState = Settings &
     objects: ObjectViews;
     /** Tile nearest to the specimen's centre. */
     middle: string;
-    /** Tile that was chosen; null: the gaze chooses. */
+    /** Tile that the user has selected; null: none, so that volumes follow the gaze. */
     selected: string | null;
     /** The only tile that is shown; null: all tiles are. */
     isolated: string | null;
@@ -75,7 +75,7 @@ export type ViewerState = Settings &
     keptViews: readonly KeptView[];
     /** Whether this device can trace paths, for which it must draw into floating-point textures. */
     canTrace: boolean;
-    /** Faults that leave the rest usable, newest last. */
+    /** Messages about faults despite which the viewer stays usable, newest last. */
     notices: readonly string[];
     /** Notices of faults that another attempt may solve. */
     retryable: readonly string[];

@@ -44,7 +44,7 @@ export type SurfaceOptions = Readonly<{
 }>;
 
 export class SurfaceSet implements Surfaces {
-  /** In um, world. */
+  /** The surfaces of all channels; coordinates are in um of the world. */
   readonly group = new Group();
   private readonly tilesets = new Map<string, SurfaceTileset>();
   private readonly toWorld = new Matrix4();
@@ -71,7 +71,9 @@ export class SurfaceSet implements Surfaces {
     return overview(this.shown().map(([, tileset]) => tileset.progress));
   }
 
-  /** Whether one channel shows all tiles. */
+  /**
+   * Whether all tiles of the first shown channel are on screen; also true if no channel is shown.
+   */
   get hasFirst(): boolean {
     const [first] = this.shown();
     return first === undefined || overview([first[1].progress]).isComplete;

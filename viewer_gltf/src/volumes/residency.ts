@@ -21,7 +21,7 @@ export type Resident = {
   /** Source of the march's tables. */
   packed: Packed | null;
   wanted: WantedTile | null;
-  /** 0 to 1. */
+  /** How far the volumes of the tile have faded in, 0 to 1. */
   presence: number;
   /** Number of the request in which the tile was last wanted; larger is more recent. */
   turn: number;

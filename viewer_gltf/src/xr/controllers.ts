@@ -87,7 +87,7 @@ export class Hand {
 }
 
 export class Controllers {
-  /** The drawn rays. */
+  /** Scene objects of the rays that are drawn from the hands. */
   readonly group = new Group();
   hands: readonly Hand[] = [];
   private readonly tube = lineGeometry();

@@ -30,7 +30,7 @@ export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
 
 export type EyeSettings = Readonly<{
   distance_m: number;
-  /** Factor of `distance_m`. */
+  /** Factor to the distance between the eyes; 0 shows both eyes the same image. */
   strength: number;
   /** CSS pixels per inch of the screen; null: estimated from the browser's name. */
   cssPixelsPerInch: number | null;

@@ -9,7 +9,7 @@ precision highp usampler3D;
 uniform vec3 uSize;  // um: edges of the box around all paths
 uniform vec3 uTexLow;  // texture coordinates at the box's low corner
 uniform vec3 uTexPerUm;  // texture coordinates per um; negative along y
-uniform float uVoxel;  // um, finest spacing
+uniform float uVoxel;  // um: finest voxel spacing
 uniform vec3 uTexels;  // size of the traced block, texels
 uniform sampler3D uVolume;
 uniform usampler3D uIndex;  // only with STREAM_BRICK: slot and level of each cell's brick
@@ -41,7 +41,7 @@ uniform vec4 uLamps[3];  // um, from the box's low corner: centre of a sphere, a
 uniform vec3 uLampLight[3];  // radiant intensity, um^2: irradiance is this by squared distance
 uniform int uScatters;  // largest number of scatterings of a path
 uniform vec3 uBeyond;  // radiance that a path receives after uScatters scatterings
-uniform float uAnisotropy;  // Henyey-Greenstein g
+uniform float uAnisotropy;  // asymmetry g of Henyey and Greenstein's phase function, -1..1
 uniform float uSurface;  // 0..1: how readily a gradient makes a surface
 uniform vec4 uContrast;  // factor to the gradients of each channel
 uniform float uShine;  // 0..1: reflectance of a surface that is seen straight on; 1 means 8 %

@@ -8,7 +8,8 @@ uniform float uEdge;  // um: longest edge of the box
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
 uniform mat4 uToBox;  // the current view: from normalised device coordinates to um of the box
 uniform vec3 uEyeAt;
-uniform mat4 uFromBox;  // the view from which the paths began
+// from um of the box to device coordinates of the view in which the paths began
+uniform mat4 uFromBox;
 uniform vec3 uEyeThere;
 uniform float uAway;  // um, distance to the centre of the box
 

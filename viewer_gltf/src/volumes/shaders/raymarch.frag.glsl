@@ -11,15 +11,15 @@ precision highp usampler3D;
 uniform vec3 uSize;  // um: edges of the tile's box
 uniform vec3 uTexLow;  // texture coordinates at the box's low corner
 uniform vec3 uTexHigh;  // texture coordinates at the box's high corner
-uniform vec3 uTexels;  // texels of mip level 0
+uniform vec3 uTexels;  // number of texels of mip level 0 along x, y, z
 uniform float uVoxel;  // um: length of path for which the opacities of the transfer functions hold
-uniform float uDensity;  // factor of uVoxel
+uniform float uDensity;  // factor to the optical depth of all matter
 uniform float uMinStep;  // um: shortest step along a ray
 uniform vec4 uFloor;  // for each channel: intensities up to this are invisible
 uniform vec4 uContrast;  // for each channel: factor of the gradients used for shading
 #ifdef MAXIMUM
-uniform vec4 uWindowLow;  // for each channel: intensity that is dark
-uniform vec4 uWindowHigh;  // for each channel: intensity that is bright
+uniform vec4 uWindowLow;  // for each channel: intensity that is shown dark, 0 to 1
+uniform vec4 uWindowHigh;  // for each channel: intensity that is shown bright, 0 to 1
 #endif
 uniform int uSteps;  // steps of a ray through all tiles, at most MAX_STEPS
 uniform int uSpare;  // steps reserved for the other tiles, one each
@@ -66,7 +66,7 @@ uniform sampler3D uReached;
 uniform mat4 uToShading;  // from the box, um, to its texture coordinates
 uniform float uShadingCell;  // um: edge of a cell of uReached
 uniform float uDepthShading;  // strength of the shading, 0 to 1
-uniform sampler2D uNoise;  // blue noise
+uniform sampler2D uNoise;  // a tile of blue noise, which shifts the samples of each ray
 uniform float uPhase;  // shift of the noise in this frame, 0 to 1
 uniform vec4 uEye;  // the eye's part of the frame: x, y, width, height, pixels
 uniform vec4 uPart;  // the eye's part of the image that is drawn here, which may have fewer pixels

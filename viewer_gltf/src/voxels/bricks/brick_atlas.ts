@@ -251,7 +251,8 @@ export class BrickTile {
       }
       bricks.push(rangesOf(table, drawn, brickCounts(table.size)));
     }
-    if (!isWhole) return; // the root of each channel comes first and soon
+    // until the coarsest brick of each channel has arrived, the last content stays on screen
+    if (!isWhole) return;
     index.needsUpdate = true;
     const finest = Number.isFinite(level) ? level : 0;
     this.shown = { channels: ids, level: finest, texture: atlas, bricks, index };

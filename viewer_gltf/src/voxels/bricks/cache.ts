@@ -58,7 +58,8 @@ export class BrickCache {
       };
       return new BrickCache(await resultOf(request));
     } catch {
-      return new BrickCache(null); // a private window, or a browser that forbids it
+      // there is no database in a private window, or if the browser forbids storage
+      return new BrickCache(null);
     }
   }
 
