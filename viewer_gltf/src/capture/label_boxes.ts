@@ -41,7 +41,10 @@ function shared(rect: Rect, others: readonly Rect[]): number {
   );
 }
 
-/** Returns the first place that overlaps no other rectangle, or the one that overlaps them least. */
+/**
+ * Returns the first of some rectangles that overlaps none of the others; if each overlaps some, the
+ * one that does so least.
+ */
 export function clearestOf(places: readonly Rect[], others: readonly Rect[]): Rect {
   return places.reduce((best, place) =>
     shared(place, others) < shared(best, others) ? place : best,

@@ -42,7 +42,7 @@ export type FrameView = Readonly<{
   head: Matrix4;
   /** Matrix from um to metres of the scene. */
   specimen: Matrix4;
-  /** null in stereo. */
+  /** The flat view; null in stereo. */
   screen: FlatScreen | null;
   /** Ray straight ahead, um. */
   gaze: Ray;

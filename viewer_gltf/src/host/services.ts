@@ -150,7 +150,7 @@ export interface Links {
 
 /** The result of the benchmark. */
 export interface BenchResult {
-  /** null: the benchmark has not run. */
+  /** The report of the benchmark; null: it has not run. */
   readonly report: object | null;
 }
 

@@ -8,7 +8,7 @@ import type { ViewerState } from "../state/viewer_state";
 
 export type Moment = Readonly<{
   state: ViewerState;
-  /** null: the opening camera. */
+  /** The camera at this moment; null: the camera of the opening view. */
   camera: CameraView | null;
   /** Whether the user was in stereo. The camera has no meaning there, because the head looks. */
   isInStereo: boolean;

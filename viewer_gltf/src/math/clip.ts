@@ -84,7 +84,10 @@ export function behindPlane(points: readonly Vec3[], plane: ClipPlane): readonly
   });
 }
 
-/** Moves points that are outside clip and box to the nearest kept place. */
+/**
+ * Moves points that the clip removes, or that lie outside the box `within`, to the nearest kept
+ * point.
+ */
 export function keptPoints(
   points: readonly Vec3[],
   { box, plane }: Clip,
@@ -217,7 +220,10 @@ export function spinPlane(
   return aboutMiddle(plane, normal.normalize().toArray(), specimen);
 }
 
-/** The plane through the same middle with another normal. */
+/**
+ * Returns the clip plane that has another normal, and passes through the middle point of its
+ * handles as before.
+ */
 function aboutMiddle(plane: ClipPlane, normal: Vec3, specimen: Box): ClipPlane {
   const { middle } = planeHandles(plane, specimen, 0);
   return withinSpecimen(normal, dot(normal, middle), specimen);

@@ -204,7 +204,7 @@ export type Histogram = Readonly<{
 export type HistogramEditor = Base &
   Readonly<{
     kind: "histogram";
-    /** null: not loaded yet. */
+    /** The joint histogram that is drawn; null: not loaded yet. */
     histogram: Histogram | null;
     /** The range of intensities (0..1) that fills the width of the drawing. */
     window: readonly [number, number];
@@ -219,7 +219,7 @@ export type HistogramEditor = Base &
     texts: readonly [string, string, string];
     /** @param reach largest distance to a corner or an edge */
     press: (at: HistogramPoint, reach: HistogramPoint) => Request;
-    /** null: nothing changes. */
+    /** Returns the request of a drag to a point of the histogram; null: nothing changes. */
     drag: (at: HistogramPoint) => Request | null;
   }>;
 /** A drawing that only its owner can make. Places are shares of its width and height, from the upper left. */
@@ -234,7 +234,10 @@ export type Picture = Base &
     /** The content in words. */
     text: string;
     press: (x: number, y: number) => Request;
-    /** null: nothing changes; absent: the picture takes presses only. */
+    /**
+     * Returns the request of a drag to a point; null: nothing changes. Absent: the picture takes
+     * presses only.
+     */
     drag?: (x: number, y: number) => Request | null;
   }>;
 /** A text that can only be read. */
@@ -296,9 +299,9 @@ export type Section = Readonly<{
 /** A section as the panel's own lists and the parts define it. */
 export type PartSection = Pick<Section, "id" | "label" | "items"> &
   Readonly<{
-    /** Place among the sections; the panel's own have multiples of ten. */
+    /** Number by which sections are ordered; those of the panel itself have multiples of ten. */
     rank: number;
-    /** Absent: the section is listed with the first ones. */
+    /** Whether a flat screen lists the section under *More*; absent: it does not. */
     isDeeper?: boolean;
   }>;
 

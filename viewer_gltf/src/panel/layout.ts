@@ -18,7 +18,7 @@ export type Facts = Readonly<{
   /** Bounds of the specimen or the isolated tile, um, world. */
   shown: Box;
   isStereo: boolean;
-  /** null: not known yet. */
+  /** Time between two frames of a motion, ms; null: not known yet. */
   frame_ms: number | null;
   settings: QualitySettings | null;
   triangles: number;
@@ -253,7 +253,10 @@ function trianglesText(triangles: number): string {
   return `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`;
 }
 
-/** Each level has half as many voxels along an edge as the one before. */
+/**
+ * Returns the resolution of a mip level in words. Each level has half as many voxels along an edge
+ * as the one before.
+ */
 function volumesText(level: number): string {
   return level === 0 ? "in full detail" : `at 1/${2 ** level} detail`;
 }

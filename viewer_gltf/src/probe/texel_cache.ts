@@ -1,6 +1,6 @@
 /**
- * Provides texels of the volumes to the CPU. Texels on the GPU can't be read back, so an available level is decompressed
- * again in the worker. The most recently used levels stay in memory.
+ * Provides texels of the volumes to the CPU. Texels on the GPU can't be read back, so an available
+ * mip level is decompressed again in the worker. The most recently used levels stay in memory.
  */
 
 import { decodeTexels } from "../bundle/decode";

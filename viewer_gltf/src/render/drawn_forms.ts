@@ -49,7 +49,7 @@ export interface MarchedVolumes {
   /** Bytes on the GPU. */
   readonly bytes: number;
   aim(view: MarchView): void;
-  /** Whether all wanted volumes of a tile are loaded, at some level. */
+  /** Whether all wanted volumes of a tile are loaded, at any mip level. */
   isReady(tile: string): boolean;
   shown(): readonly ShownVolume[];
   status(): readonly VolumeStatus[];

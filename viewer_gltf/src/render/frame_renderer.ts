@@ -30,9 +30,9 @@ import { MarchPass } from "./raymarch_pass";
 import type { SpecimenScene } from "./specimen_scene";
 
 export type Drawn = Readonly<{
-  /** Null if no part draws volumes. */
+  /** The marched volumes; null if no part of the viewer draws volumes. */
   volumes: MarchedVolumes | null;
-  /** Null if no part traces paths. */
+  /** The path-traced volumes; null if no part of the viewer traces paths. */
   traced: TracedVolumes | null;
   panes: readonly BlendedScene[];
   /** Other objects that are not opaque, besides those of the scene itself. */

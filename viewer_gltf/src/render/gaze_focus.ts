@@ -17,7 +17,7 @@ import type { ViewerState } from "../state/viewer_state";
 const OPENING_S = 0.4;
 /** Share of the outer radius within which no surface is drawn. */
 const INNER = 0.6;
-/** Seconds that the gaze must stay on the same tiles before finer levels are fetched. */
+/** Seconds that the gaze must stay on the same tiles before finer mip levels are fetched. */
 const REFINE_S = 0.25;
 
 /** Radians. Largest half angle of a cone that is marched. */

@@ -13,7 +13,7 @@ import { SourceError } from "./source_error";
 
 const SPATIAL = ["z", "y", "x"] as const;
 
-/** One level of the pyramid. */
+/** One resolution level of the pyramid. */
 export type NgffLevel = Readonly<{
   path: string;
   /** Distance between voxels (z, y, x), um, and centre of the first one; null if not stated. */

@@ -18,7 +18,7 @@ export type ImageChannel = Readonly<{
 /** An opened source: its metadata, and the functions that read its voxels. */
 export type OpenedImage = Readonly<{
   name: string;
-  /** Voxels of the finest level (z, y, x), and their distance in um. */
+  /** Number of voxels of the finest resolution level (z, y, x), and their distance in um. */
   shape: Triple;
   spacing_um: Triple;
   /** 4 x 4, column-major, um: from the world of the voxels, whose origin is the first one, to the world. */

@@ -15,6 +15,6 @@ export type CameraView = Readonly<{
   /** Place of the camera, and the point that it turns around. */
   position: Vec3;
   target: Vec3;
-  /** null: the specimen's opening pose. */
+  /** Pose of the specimen in the scene; null: the opening pose. */
   specimen: SpecimenPlacement | null;
 }>;

@@ -27,7 +27,7 @@ export const PAUSE_S = 1;
  * join its step.
  */
 export type Occasion = Readonly<{
-  /** null: the change is a step of its own. */
+  /** Key of changes that may be joined to one step; null: the change is a separate step. */
   key: string | null;
   /** Number of presses and releases so far. */
   gesture: number;

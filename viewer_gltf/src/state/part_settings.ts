@@ -56,7 +56,10 @@ export type PartSettings = Readonly<{
 
 const byPart = new Map<string, PartSettings>();
 
-/** Adds the settings of a part, or replaces those of an earlier view of the same part. */
+/**
+ * Adds the settings of a part. If an earlier bundle on this page has added settings of the same
+ * part, they are replaced.
+ */
 export function addSettings(part: string, settings: PartSettings): void {
   byPart.set(part, settings);
 }

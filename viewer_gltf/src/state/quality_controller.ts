@@ -215,7 +215,10 @@ function isTrial({ before_ms, before_notch, notch }: Quality): boolean {
   return before_ms > 0 && notch < before_notch;
 }
 
-/** Learns the price of the notches between two levels from the first window after a change. */
+/**
+ * Learns the price of the notches between the previous and the present one, from the first window
+ * of frames after a change.
+ */
 function withPrice(quality: Quality, mean_ms: number): Quality {
   const { before_ms, before_notch, notch } = quality;
   const settled = { ...quality, before_ms: 0, before_notch: notch };

@@ -27,7 +27,10 @@ export type Functions = Readonly<{
   transferFunctions: readonly string[];
   /** The two-dimensional functions of the bundle. */
   transferFunctions2d: readonly string[];
-  /** null: not fetched yet. It is fetched when something needs it. */
+  /**
+   * Content of the bundle's two-dimensional functions; null: not fetched yet. It is fetched when
+   * something needs it.
+   */
   transfer2d: Transfer2d | null;
   /** The user's own versions of functions, by name. */
   shapes: Readonly<Record<string, Shapes>>;

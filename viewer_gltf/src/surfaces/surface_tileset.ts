@@ -186,7 +186,10 @@ export class SurfaceTileset {
     return this.drawn.reduce((sum, { triangles }) => sum + triangles, 0);
   }
 
-  /** The levels of each tile that was in view in the last frame, as far as they are known. */
+  /**
+   * The levels of detail (LODs) of each tile that was in view in the last frame, as far as they are
+   * known.
+   */
   get inView(): readonly Levels[] {
     const { triangles } = this.channel;
     const coarsest = this.tiles.root?.children ?? [];

@@ -1,8 +1,8 @@
 /** Makes surfaces coarser if those in view have more triangles than the device can draw in time. */
 
 /**
- * The levels of a tile in view, coarsest first: the error on screen, infinite at the eye, and the
- * triangles.
+ * The levels of detail of a tile in view, coarsest first: for each, its error on screen (infinite
+ * at the eye) and its number of triangles.
  */
 export type Levels = readonly Readonly<{ error_px: number; triangles: number }>[];
 

@@ -73,7 +73,8 @@ export class Marches implements DrawnMarches {
   }
 
   /**
-   * Values that change when the marches look different, such as a new level or a step of a fade.
+   * Values that change when the marches look different, such as a new mip level or a step of a
+   * fade.
    */
   get key(): readonly unknown[] {
     return this.drawn.map(({ march, packed, resident: { texture, presence } }) => [

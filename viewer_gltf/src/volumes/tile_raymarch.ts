@@ -244,7 +244,7 @@ export class TileMarch {
     uniforms.uFresh.value = fresh;
     uniforms.uPresence.value = presence;
     const coarsest = Math.max(shown.level, old?.level ?? 0);
-    // streamed bricks have ranges of the drawn level, even if it is coarse
+    // the value ranges of streamed bricks are those of the drawn mip level, even if it is coarse
     const isExact = coarsest === 0 || shown.index !== null;
     uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / SKIP_BRICK);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;

@@ -122,7 +122,7 @@ export function withValue<On>(row: Parameter<On>, on: On, value: Value): On {
   return (row.set as (on: On, value: Value) => On)(on, next);
 }
 
-/** Returns the place of a value between the limits, 0..1. */
+/** Returns the position of a value between the smallest and the largest one, 0..1, for a slider. */
 export function shareOf<On>(
   { limits: [low, high], isLogarithmic }: NumberParameter<On>,
   value: number,

@@ -20,7 +20,7 @@ export class CoarseTexels {
     return this.underWay > 0;
   }
 
-  /** The texels of a loaded level; null until `onChange` is called, or if decoding fails. */
+  /** The texels of a loaded mip level; null until `onChange` is called, or if decoding fails. */
   get(source: VolumeSource, level: number): Uint8Array | null {
     const kept = this.kept.get(source);
     if (kept?.level === level) return kept.texels;

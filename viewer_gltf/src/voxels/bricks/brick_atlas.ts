@@ -103,7 +103,7 @@ export class BrickTile {
     return [...this.trees.values()].map(({ table }) => table?.threshold ?? -1);
   }
 
-  /** Wants these volumes; their levels are streamed by view. */
+  /** Starts to stream the bricks of these volumes, as the camera's view needs them. */
   want(
     sources: ReadonlyMap<string, VolumeSource>,
     _levels?: readonly number[],

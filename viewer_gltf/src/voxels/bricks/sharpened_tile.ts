@@ -78,8 +78,8 @@ export class SharpenedTile {
   }
 
   /**
-   * Loads these channels and levels of the coarse volumes. If the channels changed, no finer volume
-   * is loaded yet.
+   * Loads these channels and mip levels of the coarse volumes. If the channels changed, no finer
+   * volume is loaded yet.
    */
   want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
     const names = [...sources.keys()];
