@@ -36,7 +36,7 @@ export class Forms {
     return { done: sum("done"), total: sum("total"), isComplete };
   }
 
-  /** Whether all tiles of the first channel are shown. */
+  /** Whether all tiles of the first shown channel are on screen. */
   get hasFirst(): boolean {
     return this.all.every(({ hasFirst = true }) => hasFirst);
   }
@@ -148,7 +148,7 @@ export class Forms {
     for (const form of this.all) form.forget?.();
   }
 
-  /** Called before each frame. */
+  /** Updates the materials of all forms; called before each frame. */
   updateMaterials(): void {
     for (const form of this.all) form.updateMaterials?.();
   }

@@ -50,7 +50,7 @@ export class FrameLoop {
   private hasNews = false;
   /** Whether the previous frame was part of a motion, so that it was drawn within a budget. */
   private wasMoving = false;
-  /** Whether the last pass of the loop drew a frame. */
+  /** Whether the last call of `frame` drew anything. Frames are skipped while nothing changes. */
   private hasDrawn = false;
   private waiting: (() => void)[] = [];
   private drawn: (() => void)[] = [];

@@ -83,7 +83,7 @@ export type Hit = Probed &
 export type Tap = Readonly<{
   ray: Ray;
   by: "pointer" | "key" | "hand" | "gaze";
-  /** Time on the clock of the page, ms. */
+  /** Time of the choice on the clock of the page's events, ms. */
   time_ms: number;
 }>;
 

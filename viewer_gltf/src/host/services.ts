@@ -76,7 +76,7 @@ export interface PagePanel {
   perform(request: Request | Refusal): void;
   /** Focuses a control, also in a hidden panel. Returns whether it exists. */
   focus(section: string, control: string): boolean;
-  /** Shows an announcement only on the page. */
+  /** Shows an announcement on the page, and not in stereo. */
   showAnnouncement(words: string): void;
   /** Adds a button to the last announcement. */
   offer(words: string, label: string, act: () => void): void;

@@ -59,7 +59,7 @@ export class Steps {
     this.seenFrom = moment.camera;
   }
 
-  /** Adds a step; called before the state changes. */
+  /** Adds an undo step with the present state and camera; called before the state changes. */
   add(name: string, key: string | null): void {
     this.note();
     this.push(this.now(), name, key);

@@ -90,7 +90,7 @@ export class Viewpoint {
     this.options.onChange();
   }
 
-  /** Returns whether the flat camera has a pose. */
+  /** Returns whether the flat camera is at a given pose. */
   isAt(look: CameraPose): boolean {
     return isSameCameraPose(look, this.navigation);
   }

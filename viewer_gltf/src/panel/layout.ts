@@ -208,7 +208,7 @@ function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
   ];
 }
 
-/** Shows how fine and how fast this device draws. */
+/** Returns the texts that report in which detail and at which frame rate this device draws. */
 function aboutItems(facts: Facts): readonly Control[] {
   const { settings, frame_ms, triangles, volumeLevel } = facts;
   const items: Control[] = [

@@ -33,7 +33,7 @@ export type StoredVoxels = Readonly<{
 }>;
 
 export type CoarseVolume = Readonly<{
-  /** Values, x fastest. */
+  /** Values of the averaged voxels, x fastest. */
   voxels: Float32Array<ArrayBuffer>;
   shape: Triple;
   /** Centre of voxel (0, 0, 0), in voxels of the finest level. */

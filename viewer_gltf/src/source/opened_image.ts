@@ -23,7 +23,7 @@ export type OpenedImage = Readonly<{
   spacing_um: Triple;
   /** 4 x 4, column-major, um: from the world of the voxels, whose origin is the first one, to the world. */
   placement: readonly number[];
-  /** Whether the sides of a patient are known. */
+  /** Whether the directions to a patient's left, posterior and superior side are known. */
   hasSides: boolean;
   /** Whether stored values may be below 0. */
   isSigned: boolean;

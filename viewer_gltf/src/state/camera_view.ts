@@ -3,7 +3,7 @@ import type { Vec3 } from "../math/vec3";
 
 /**
  * The specimen's centre, its rotation (quaternion x, y, z, w) and its size, as a multiple of the
- * usual one.
+ * size at the opening.
  */
 export type SpecimenPlacement = Readonly<{
   position: Vec3;

@@ -32,7 +32,7 @@ export type GazeInput = Readonly<{
   clip: Clip;
   switchDistance_um: number;
   discRadius_rad: number;
-  /** Time since the previous frame. */
+  /** Time since the previous frame, s. */
   dt_s: number;
 }>;
 

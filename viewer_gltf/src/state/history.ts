@@ -29,7 +29,10 @@ export const PAUSE_S = 1;
 export type Occasion = Readonly<{
   /** Key of changes that may be joined to one step; null: the change is a separate step. */
   key: string | null;
-  /** Number of presses and releases so far. */
+  /**
+   * Number of times that the user has pressed or released a key or a button so far. Changes with an
+   * equal number belong to one gesture.
+   */
   gesture: number;
   isHeld: boolean;
   time_s: number;

@@ -1,7 +1,7 @@
 /** Groups notices for display: notices of many files with the same fault are shown as one. Pure. */
 
 export type NoticeGroup = Readonly<{
-  /** Text that is shown. */
+  /** The text that the page shows for the group. */
   text: string;
   /** Notices in the group, which are dismissed together. */
   of: readonly string[];

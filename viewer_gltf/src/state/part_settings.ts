@@ -10,7 +10,7 @@ import type { ViewerState } from "./viewer_state";
 /** How an action of a part changes the state, and its words. */
 export type ActionRules<A> = Readonly<{
   reduce: (state: ViewerState, action: A) => ViewerState;
-  /** Name of the step in the history, in a few words. */
+  /** Name of the action's undo step, in a few words. */
   name: string;
   /** Whether changes in quick succession, for example by a drag, are one step of the history. */
   isGradual?: boolean;

@@ -23,15 +23,15 @@ export type EnvironmentName = (typeof ENVIRONMENTS)[number];
 
 export const TONE_MAPS = ["filmic", "none"] as const;
 
-/** Samples of each pixel in a finished image. */
+/** Number of samples of each pixel with which a path-traced image counts as finished. */
 export const ENOUGH_SAMPLES = 1024;
 
 type TraceNumber = Readonly<{
   label: string;
-  /** Value in a bundle that has just opened. */
+  /** Value of the setting in a bundle that has just opened. */
   start: number;
   limits: readonly [number, number];
-  /** Whether equal steps of the slider are equal factors. */
+  /** Whether equal movements of the slider multiply the value by equal factors. */
   isLogarithmic?: boolean;
   text: (value: number) => string;
   /** Explanation of the effect, where the label does not say it. */
@@ -178,7 +178,7 @@ export type TraceSettings = NumbersOf<typeof MEDIUM_NUMBERS> &
     isMultiple: boolean;
     environment: EnvironmentName;
     lamps: readonly Lamp[];
-    /** Whether the image adjustments are applied. */
+    /** Whether the image adjustments, such as exposure, sharpness and occlusion, are applied. */
     isPostOn: boolean;
     toneMap: (typeof TONE_MAPS)[number];
   }>;

@@ -206,8 +206,8 @@ function shifted(low: number, high: number, by: number): Range {
 }
 
 /**
- * Returns the shape with one part moved to a point. It stays inside the histogram, and at least of
- * the smallest size.
+ * Returns the shape with one part moved to a point. The shape stays inside the histogram, and does
+ * not become smaller than MIN_WIDTH.
  */
 export function resize(shape: Shape, part: Part, to: HistogramPoint): Shape {
   if (part === "body") return shape;
@@ -222,7 +222,10 @@ export function resize(shape: Shape, part: Part, to: HistogramPoint): Shape {
   return shape.kind === "rectangle" ? { ...resized, tip: (v0 + v1) / 2 } : resized;
 }
 
-/** Makes a shape of the usual size at a point: a rectangle around it, or a triangle with its tip below it. */
+/**
+ * Makes a shape of a standard size at a point: a rectangle around it, or a triangle with its tip
+ * below it.
+ */
 export function makeShape(kind: ShapeKind, at: HistogramPoint): Shape {
   const [width, height] = [0.2, 0.3];
   const tip = clamp(at.value, 0, 1);

@@ -55,7 +55,7 @@ export class SurfaceSet implements Surfaces {
    * The tile that is drawn as a volume, and the faces of its neighbours towards it, by neighbour.
    */
   private open: Readonly<{ tile: string | null; faces: ReadonlyMap<string, Face> }> = CLOSED;
-  /** Whether the overview was complete once. */
+  /** Whether the coarsest surfaces of all shown channels have been loaded at least once. */
   private hasBegun = false;
   private errorTarget_px = ERROR_TARGET_PX;
   /** How much coarser the surfaces are drawn, so that the device keeps its frame rate. */

@@ -154,7 +154,7 @@ export class Marches implements DrawnMarches {
     march.skipBy(distances);
   }
 
-  /** Shows each march as far as it has faded in. */
+  /** Passes to each march how far its volume, and the newest mip level of it, have faded in. */
   show(): void {
     for (const { march, texture, packed, presence } of this.residents.all) {
       if (march === null || packed === null) continue;

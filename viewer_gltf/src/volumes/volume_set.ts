@@ -217,7 +217,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     if (texture instanceof SharpenedTile) texture.sharpen();
   }
 
-  /** Limits the texture edge from the next `sync` on. */
+  /** Limits the number of voxels along an edge of a tile's volume, from the next `sync` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
   }

@@ -93,7 +93,10 @@ export class Stereo {
     return this.loading;
   }
 
-  /** Passes choices on the page to the headset panel. */
+  /**
+   * Passes to the headset panel what the user has chosen in the panel of the page, such as open
+   * sections.
+   */
   showInPanel(choices: Partial<PanelView>): void {
     this.choices = { ...this.choices, ...choices };
     this.hands?.panel.take(choices);

@@ -80,7 +80,7 @@ export class BrickLink {
     this.post({ type: "close", tile, channel });
   }
 
-  /** Sets the current view. Call it in every frame. */
+  /** Requests the bricks that the camera's present view needs. Call it in every frame. */
   look(view: BrickView, now_ms: number): void {
     if (
       !this.isOpen ||
