@@ -53,7 +53,10 @@ export function clearestOf(places: readonly Rect[], others: readonly Rect[]): Re
 
 export type Corner = "top-left" | "top-right" | "bottom-left" | "bottom-right";
 
-/** Returns a block's places in the given corners of an image, in this order. */
+/**
+ * Returns the rectangles that an element of the caption would take in the given corners of an
+ * image, in this order.
+ */
 export function inCorners(
   corners: readonly Corner[],
   block: Readonly<{ width: number; height: number }>,

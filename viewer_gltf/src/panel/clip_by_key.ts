@@ -38,13 +38,16 @@ export function clipPartsOf({ box, plane }: Clip): readonly ClipPart[] {
   ];
 }
 
-/** Returns the chosen part: the picked one if it still exists, else the first. */
+/**
+ * Returns the part of the cuts that the keys change: the picked one if it still exists, else the
+ * first.
+ */
 export function chosenClipPart(clip: Clip, picked: ClipPart | null): ClipPart | undefined {
   const clipParts = clipPartsOf(clip);
   return clipParts.find((clipPart) => clipPart === picked) ?? clipParts[0];
 }
 
-/** Returns the handle of a part in the scene. */
+/** Returns the handle in the scene that moves the same part of the cuts. */
 export function handleOf(clipPart: ClipPart): HandleId {
   return isTurn(clipPart) ? "plane-tip" : clipPart;
 }

@@ -102,7 +102,10 @@ export const START_VIEW: PanelView = {
 };
 
 type Base = Readonly<{
-  /** Unique in the panel; for a channel's control: channel/part. */
+  /**
+   * ID that is unique in the panel. For a channel's control, it is the channel's ID, a slash and
+   * the control's own name.
+   */
   id: string;
   label: string;
   /** Label for places without the group's name around it: for screen readers and gaze. */
@@ -222,7 +225,10 @@ export type HistogramEditor = Base &
     /** Returns the request of a drag to a point of the histogram; null: nothing changes. */
     drag: (at: HistogramPoint) => Request | null;
   }>;
-/** A drawing that only its owner can make. Places are shares of its width and height, from the upper left. */
+/**
+ * A drawing that the part of the viewer which owns it makes itself. Places are shares of its width
+ * and height, from the upper left.
+ */
 export type Picture = Base &
   Readonly<{
     kind: "picture";

@@ -98,7 +98,7 @@ export function objectsSection(channel: string, count: number): string {
 export const labelMapsOf = ({ channels }: ViewerState) =>
   channels.filter(({ shown, hasObjects }) => shown && hasObjects);
 
-/** Returns the sections that do not belong to a part. */
+/** Returns the panel's own sections, which no part of the viewer contributes. */
 function ownSections(state: ViewerState, facts: Facts, view: PanelView): readonly PartSection[] {
   const { isStereo } = facts;
   const about = aboutItems(facts);

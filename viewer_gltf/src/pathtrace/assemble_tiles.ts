@@ -44,7 +44,10 @@ export function paste({ size, stride, texels }: Block, finest: Size3, part: Part
   }
 }
 
-/** Returns the block's texels along an axis that lie in a part, each with the nearest texel of the part. */
+/**
+ * Returns the block's texels along an axis that lie in a tile, each with the nearest texel of that
+ * tile.
+ */
 function axisOf(count: number, finest: number, { at, whole, size }: Part, k: number) {
   const pairs: [number, number][] = [];
   for (let i = 0; i < count; i++) {

@@ -62,14 +62,14 @@ export function makeSurfaceFrame(
 export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean; isSolid: boolean }>;
 
 /**
- * GLSL chunks by which a part extends the surface shaders; see insertions/surface.vert.glsl and
- * surface.frag.glsl.
+ * GLSL chunks by which a part of the viewer extends the surface shaders; see
+ * insertions/surface.vert.glsl and surface.frag.glsl.
  */
 type PartChunk =
   | `part/vertex_${"declared" | "place" | "end"}`
   | `part/fragment_${"declared" | "color"}`;
 
-/** Shader code and uniforms that a part adds to some surfaces. */
+/** Shader code and uniforms that a part of the viewer adds to some surfaces. */
 export type SurfacePart = Readonly<{
   /** Cache key of the shader text: equal texts have equal keys. */
   key: string;

@@ -70,7 +70,7 @@ class SharePart implements Part, Links {
     const address = new URL(pageAddress());
     for (const name of settingNames()) address.searchParams.delete(name);
     address.hash = linkOf(host, initialState(host.bundle.manifest));
-    // In the split screen the address stays; it follows the view again afterwards.
+    // In the split screen the address is not changed. Afterwards it follows the view again.
     if (hasAddress() && !isPassingStep()) writeAddress(address);
     host.panel.show({ link: address.href });
     host.panel.unfold("share");

@@ -89,7 +89,7 @@ export class SurfaceTileset {
     this.tiles.registerPlugin({
       name: "STEREOCELL_BUNDLE",
       fetchData: (url: string, { signal }: RequestInit) => files.fetch(url, signal),
-      // before the renderer adds its own `tile` to each userData
+      // called before the renderer adds its own `tile` to each userData
       processTileModel: (scene: Object3D, tile: Tile) => this.adopt(scene, tile),
     });
     this.tiles.addEventListener("load-root-tileset", () => {

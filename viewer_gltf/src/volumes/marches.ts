@@ -138,7 +138,9 @@ export class Marches implements DrawnMarches {
     shown: Packed,
     appearances: readonly Appearance[],
   ): Promise<void> {
-    march.skipBy(null); // parts that the old table skips may be visible now
+    // nothing is skipped until the new table is computed: bricks that the old table skips may be
+    // visible now
+    march.skipBy(null);
     this.skipsUnderWay++;
     const distances = await this.occupancy
       .computeDistances(march.volume.tile, {

@@ -256,8 +256,8 @@ export class TileMarch {
   }
 
   /**
-   * Takes over colours and tables, by uploading a few kilobytes. Returns whether the visible part
-   * may differ.
+   * Takes over colours and tables, by uploading a few kilobytes. Returns whether other voxels may
+   * be visible than before.
    */
   setAppearances(appearances: readonly Appearance[]): boolean {
     const differs = this.tables.sync(appearances);

@@ -67,8 +67,8 @@ function shownSections({ sections }: Layout): readonly Section[] {
 }
 
 /**
- * Distributes blocks to pages without splitting a block. A page has at most six targets, unless one
- * block has more.
+ * Distributes blocks (rows and larger pieces) to pages without splitting a block. A page has at
+ * most six targets, unless one block has more.
  *
  * @param height height of a page, px
  */

@@ -43,7 +43,7 @@ export class CoarseTexels {
       entry.texels = await decodeTexels([{ bytes, name }], texels(levels[entry.level]));
     } catch (error) {
       if (!(error instanceof DecodeError)) throw error;
-      this.onError(error); // the level was drawn before, so it is not damaged
+      this.onError(error); // the file is not damaged, because this mip level was drawn before
     } finally {
       this.underWay--;
     }

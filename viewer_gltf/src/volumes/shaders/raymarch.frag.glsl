@@ -199,12 +199,14 @@ void main() {
   for (int leg = 0; leg < 3; leg++) {
     float stop = min(isPast ? end : edge, pane);
     for (; i < steps && t < stop && sum.a < FULL; i++) {
-      // The rest of the ray divided by the rest of the budget, so that it always reaches the end.
+      // The rest of the ray is divided by the number of steps that are left, so that the ray always
+      // reaches its end.
       float dt = max(uMinStep, (end - t) / float(steps - i));
-      // A separate loop, so that neighbouring rays sample together, however much they skipped.
+      // Skipping has a separate loop, so that neighbouring rays sample together, however much they
+      // skipped.
       while (t >= exit) {
         vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
-        // By whole steps, so that samples lie where they would lie without skipping.
+        // The ray skips whole steps, so that samples lie where they would lie without skipping.
         float skip = block.y * floor((block.x - t) / dt) * dt;
         exit = skip > 0.0 ? t + skip : block.x;
         if (skip <= 0.0) break;
