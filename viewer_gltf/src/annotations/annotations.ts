@@ -243,7 +243,8 @@ export class Marks {
     if (probed === null) return null;
     const channel = this.state.channels.find(({ id }) => id === probed.channel);
     const { tiles } = this.state;
-    const tile = tiles.length > 1 ? tileName(probed.tile, tiles) : ""; // a single tile needs no name
+    // if the specimen has only one tile, its name is not shown
+    const tile = tiles.length > 1 ? tileName(probed.tile, tiles) : "";
     const text = [tile, channel?.name ?? ""].filter((part) => part !== "").join(" · ");
     return text === "" ? null : { probed, text };
   }

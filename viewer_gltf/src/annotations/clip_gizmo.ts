@@ -63,7 +63,8 @@ export class ClipMark {
     }
     this.sheet.material.side = DoubleSide;
     this.sheet.renderOrder = MARKS_ORDER - 1; // drawn before the handles
-    this.sheet.clear(); // without the ghost that would show the sheet through the specimen and dull it
+    // removes the faint copy (ghost), which would show through the specimen and dull it
+    this.sheet.clear();
     this.group.add(this.edges, this.rim, this.sheet, this.arm, ...this.handles.values());
     this.show({ box: null, plane: null }, { min: [0, 0, 0], max: [1, 1, 1] });
   }

@@ -156,9 +156,10 @@ export class MeasureMark {
   }
 
   /**
-   * Shows the newest measurement. The values at its points are read again when a point or `key` changes.
+   * Shows the newest measurement. The values at its points are read again when a point or `key`
+   * changes.
    *
-   * @param key names the sources of the values
+   * @param key a text that names the volumes from which the values are read
    */
   show(points: readonly Vec3[], kind: MeasureKind, key: string): void {
     this.count = points.length;

@@ -1,4 +1,7 @@
-/** Replaces the view on the page by a newer one of the same specimen, without a jump. */
+/**
+ * Replaces the bundle on the page by a newer one of the same specimen, while the camera and all
+ * settings stay.
+ */
 import { element } from "../dom/element";
 import type { Host } from "../host/host";
 import { linkOf } from "../share/link_of";

@@ -131,7 +131,10 @@ function notify(host: Host, notes: readonly string[]): void {
   for (const text of notes) host.dispatch({ type: "notify", text }, false);
 }
 
-/** Follows the build behind the page: each newer view replaces the one before. */
+/**
+ * Follows the build behind the page: each newer bundle that the build offers (a view) replaces the
+ * one before.
+ */
 function followBuild({ base }: Bundle, live: LiveHost): void {
   const root = base.slice(0, base.length - live.folder.length);
   const show = async (newer: string) => {
@@ -151,7 +154,10 @@ function followBuild({ base }: Bundle, live: LiveHost): void {
   );
 }
 
-/** Makes the page of a bundle in an element. `place` sets the opening view. */
+/**
+ * Makes the page of a bundle in an element. The function `place` sets the camera and the settings
+ * with which it opens.
+ */
 async function openIn(
   parent: HTMLElement,
   bundle: Bundle,

@@ -12,12 +12,12 @@ export type Subject = Readonly<{
   canTrace: boolean;
   /** Longest edges of a tile's volume at each of its mip levels, voxels, in ascending order. */
   edges: () => Promise<readonly number[]>;
-  /** Limits volumes from now on to levels of at most `edge` voxels along an edge. */
+  /** Limits volumes from now on to mip levels of at most `edge` voxels along an edge. */
   limit: (edge: number) => void;
   show: (mode: BenchMode) => void;
   /** Resolves once everything that is shown has loaded. */
   settled: () => Promise<void>;
-  /** Returns the place of the eyes, and the specimen's centre at the start of a flight, m. */
+  /** Returns the position of the eyes, and the specimen's centre at the start of a flight, m. */
   stand: () => Readonly<{ eye: Vec3; middle: Vec3 }>;
   fly: (pose: FlightPose) => void;
   /** Resolves when the next frame has been drawn. */

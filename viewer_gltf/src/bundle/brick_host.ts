@@ -1,6 +1,9 @@
-/** Finds out whether a host sends the bricks of each view. Pure. */
+/** Finds out whether a host sends the bricks that the camera's view needs. Pure. */
 
-/** Header by which the server reports this on every response, with the folder of a view that has its own bricks. */
+/**
+ * Header by which the server reports on every response that it sends bricks. While a source is
+ * built, it names the folder of the intermediate bundle to which the bricks belong.
+ */
 const HEADER = "Stereocell-Bricks";
 
 /** Returns the websocket's address; null if the host has none. */

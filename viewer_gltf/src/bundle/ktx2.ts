@@ -1,4 +1,4 @@
-/** Reads whole KTX2 textures: checks format and size, and decompresses levels. */
+/** Reads whole KTX2 textures: checks format and size, and decompresses mip levels. */
 import {
   KHR_SUPERCOMPRESSION_NONE,
   KHR_SUPERCOMPRESSION_ZSTD,
@@ -48,7 +48,7 @@ export function readTexture(
   return texture;
 }
 
-/** Returns the texels of one level, x fastest. Throws BundleError. */
+/** Returns the texels of one mip level, x fastest. Throws BundleError. */
 export async function readLevel(
   texture: KTX2Container,
   path: string,
@@ -84,7 +84,10 @@ export async function readLevel(
   }
 }
 
-/** Returns the zstd frame of one level; null if the texture is not compressed. Throws BundleError. */
+/**
+ * Returns the zstd frame of one mip level; null if the texture is not compressed. Throws
+ * BundleError.
+ */
 export function compressedLevel(
   texture: KTX2Container,
   path: string,

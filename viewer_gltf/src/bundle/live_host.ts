@@ -1,4 +1,7 @@
-/** Finds out whether the bundle is a view of a source that the server is building. Pure. */
+/**
+ * Finds out whether the bundle is a view: an intermediate bundle of a source that the server is
+ * building. Pure.
+ */
 
 /** Header of the manifest by which the server reports a build, with the folder of the newest view. */
 const HEADER = "Stereocell-Live";

@@ -14,11 +14,14 @@ import { valuesAddress } from "./values_host";
 export type Bundle = Readonly<{
   base: string;
   manifest: Manifest;
-  /** Address of the websocket that sends the bricks of each view; if absent, volumes are files. */
+  /**
+   * Address of the websocket that sends the bricks that the camera's view needs; if absent, volumes
+   * are files.
+   */
   bricks?: string;
   /** Address of the measured values; absent if the host has none. */
   values?: string;
-  /** The build whose view of a source this is; absent if the bundle is complete. */
+  /** The build of which this is an intermediate bundle; absent if the bundle is complete. */
   live?: LiveHost;
 }>;
 

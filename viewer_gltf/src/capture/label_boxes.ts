@@ -41,7 +41,10 @@ function shared(rect: Rect, others: readonly Rect[]): number {
   );
 }
 
-/** Returns the first place that overlaps no other rectangle, or the one that overlaps them least. */
+/**
+ * Returns the first of some rectangles that overlaps none of the others; if each overlaps some, the
+ * one that does so least.
+ */
 export function clearestOf(places: readonly Rect[], others: readonly Rect[]): Rect {
   return places.reduce((best, place) =>
     shared(place, others) < shared(best, others) ? place : best,
@@ -50,7 +53,10 @@ export function clearestOf(places: readonly Rect[], others: readonly Rect[]): Re
 
 export type Corner = "top-left" | "top-right" | "bottom-left" | "bottom-right";
 
-/** Returns a block's places in the given corners of an image, in this order. */
+/**
+ * Returns the rectangles that an element of the caption would take in the given corners of an
+ * image, in this order.
+ */
 export function inCorners(
   corners: readonly Corner[],
   block: Readonly<{ width: number; height: number }>,

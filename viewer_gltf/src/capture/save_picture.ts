@@ -36,7 +36,7 @@ export type Scene = Readonly<{
   renderer: WebGLRenderer;
   navigation: Navigation;
   studio: StillMaker;
-  /** Height of the view, CSS pixels. */
+  /** Height of the canvas on the page, CSS pixels. */
   height_px: number;
   /** From um to the scene. */
   specimen: Matrix4;

@@ -26,9 +26,15 @@ function saveItems(state: ViewerState, isFilming: boolean, next: number): readon
 }
 
 export const SAVE_COMMANDS = [
-  /** Saves an image of the view in the chosen size. A second use cancels. */
+  /**
+   * Saves an image of the view in the chosen size. Using the command again meanwhile cancels the
+   * image.
+   */
   "save-picture",
-  /** Saves a video once around the specimen, or through the kept views. A second use cancels. */
+  /**
+   * Saves a video once around the specimen, or through the kept views. Using the command again
+   * meanwhile cancels the video.
+   */
   "save-video",
   "keep-view",
   "next-view",

@@ -42,9 +42,9 @@ const FRAGMENT = insertionsOf(includeChunks(fragmentInsertions, CHUNKS));
 const BOTH = 4;
 
 /**
- * Shared by reference. The matrices `uEyeClip` transform from the space between the eyes to the
- * clip space of the whole frame, in which each eye has its part. The number `uMiddle` is where the
- * right eye's part begins, pixels.
+ * Makes the uniforms that all materials which draw for both eyes share by reference. The matrices
+ * `uEyeClip` transform from the space between the eyes to the clip space of the whole frame, in
+ * which each eye has its part. The number `uMiddle` is where the right eye's part begins, pixels.
  */
 function makeUniforms() {
   return {

@@ -9,7 +9,10 @@ import { AXES, type Vec3, withPart } from "../math/vec3";
 import { CORNER_PLANES, type MarchClip, noCorner } from "./clip_uniforms";
 
 const MAX_PLANES = 7; // six faces of the box, and the plane
-/** um. Farther than any specimen, but within the precision of floats. */
+/**
+ * Largest coordinate, um, of a clip box that removes nothing: farther than any specimen, but within
+ * the precision of floats.
+ */
 const FAR = 1e9;
 /** A plane that removes nothing. */
 const NOWHERE: ClipPlane = { normal: [0, 0, 0], offset_um: 1 };

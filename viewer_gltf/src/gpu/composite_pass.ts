@@ -45,7 +45,10 @@ export type Disc = Readonly<{
   uApex: { value: Vector3 };
   uAxis: { value: Vector3 };
   uDisc: { value: Vector2 };
-  /** Distance of the rim, metres. */
+  /**
+   * Distance from the eye, metres, of the point on a pixel's ray at which the disc's weight is
+   * computed.
+   */
   uRim: { value: number };
 }>;
 
@@ -100,7 +103,10 @@ export class Overlay {
     this.mesh.visible = false;
   }
 
-  /** Shows the image drawn for these eyes, with `scale` pixels per pixel of the frame. */
+  /**
+   * Shows the image drawn for these eyes, with `scale` pixels for each pixel of the frame along an
+   * edge.
+   */
   show(eyes: Eyes, scale: number): void {
     const { uEyes, uParts, uEyeCount } = this.uniforms;
     const { uToScene, uEyeAt } = this.rays;

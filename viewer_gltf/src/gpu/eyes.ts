@@ -6,7 +6,7 @@
 import { PerspectiveCamera, Vector4, type WebGLRenderer } from "three";
 
 export type Eye = Readonly<{
-  /** Its matrices are set by the caller and hold for the frame. */
+  /** Camera of the eye. The caller sets the camera's matrices once for each frame. */
   camera: PerspectiveCamera;
   /** x, y, width, height in pixels of the frame buffer, from its lower left corner. */
   viewport: Vector4;

@@ -29,7 +29,10 @@ export class FilledPeriphery {
     this.pass = new ScreenPass(FILL_FRAGMENT, { uFirst: nothing(), uSecond: nothing(), uLens });
   }
 
-  /** Fills both textures of the march, which has `scale` pixels per pixel of the frame buffer. */
+  /**
+   * Fills the skipped pixels in both textures of the march, which has `scale` pixels for each pixel
+   * of the frame buffer along an edge.
+   */
   render({ textures }: WebGLRenderTarget, eyes: Eyes, scale: number): void {
     const { renderer, pass, target } = this;
     const { uFirst, uSecond } = pass.uniforms;

@@ -4,7 +4,10 @@ import type { CommandTable, PartHost } from "./part";
 import type { Parts } from "./parts";
 import type { Taps } from "./taps";
 
-/** Commands before which an earlier move of the camera becomes a step of its own. */
+/**
+ * Commands that move the camera. A move that the user made before one of them becomes a separate
+ * undo step.
+ */
 const CAMERA_COMMANDS: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
 const NOTHING_AHEAD = "Nothing is in the middle of the view.";
 

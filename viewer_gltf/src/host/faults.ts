@@ -7,13 +7,16 @@ import type { ViewerState } from "../state/viewer_state";
 export const DROPPED = "The graphics driver has dropped the view. The page is drawing it again.";
 const WAITING = "The host does not answer. The page keeps trying; loaded parts stay on screen.";
 const OFFLINE = "This device is offline. Parts that are not loaded yet appear once it is online.";
-/** Faults of files that only refine surfaces or volumes. */
+/**
+ * Matches messages about files that only refine surfaces or volumes, so that coarser data stay on
+ * screen without them.
+ */
 const FINER = /^(channels|volumes)\/\S+\.(glb|ktx2):/;
 
 export type FaultsOptions = Readonly<{
   state: () => ViewerState;
   dispatch: (action: Action) => void;
-  /** Whether a part of the view is missing, and not only coarse. */
+  /** Whether some data of the view is not on screen at all, not even at a coarse resolution. */
   isIncomplete: () => boolean;
 }>;
 

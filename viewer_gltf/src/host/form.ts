@@ -16,18 +16,18 @@ export const ERROR_TARGET_PX = 2;
 /** The tiles that the gaze shows as volumes, and the volumes that may be loaded. */
 export type Focus = Readonly<{
   focusTiles: FocusState;
-  /** Whether the gaze has rested, so that finer levels may be fetched. */
+  /** Whether the gaze has rested, so that finer resolution levels of the volumes may be fetched. */
   mayRefine: boolean;
   /** Whether the overview of all tiles is loaded. Volumes are loaded after it. */
   hasOverview: boolean;
 }>;
 
-/** View of one eye for streaming. */
+/** Camera, image size and allowed error for which a form fetches its files. */
 export type StreamView = Readonly<{
   camera: Camera;
   width_px: number;
   height_px: number;
-  /** Largest error on screen, in pixels. */
+  /** Largest distance on screen between a drawn surface and the exact one, in pixels. */
   error_px: number;
 }>;
 
@@ -51,11 +51,11 @@ export type StreamView = Readonly<{
 export interface Form {
   /** Loading progress of the overview of all tiles. */
   readonly overview?: Progress;
-  /** Whether all tiles of the first channel are shown. */
+  /** Whether all tiles of the first shown channel are on screen. */
   readonly hasFirst?: boolean;
-  /** Whether a part of the frame is missing, and not only coarse. */
+  /** Whether some data of the frame is not drawn at all, not even at a coarse resolution. */
   readonly isIncomplete?: boolean;
-  /** Triangles on screen. */
+  /** Number of triangles that this form has on screen. */
   readonly triangles?: number;
   /** Surfaces that are translucent now. */
   readonly panes?: readonly BlendedScene[];

@@ -36,7 +36,7 @@ export class Forms {
     return { done: sum("done"), total: sum("total"), isComplete };
   }
 
-  /** Whether all tiles of the first channel are shown. */
+  /** Whether all tiles of the first shown channel are on screen. */
   get hasFirst(): boolean {
     return this.all.every(({ hasFirst = true }) => hasFirst);
   }
@@ -126,7 +126,7 @@ export class Forms {
     return true;
   }
 
-  /** Advances fades by a time. Returns whether anything still fades. */
+  /** Advances the fades of all forms by some seconds. Returns whether anything still fades. */
   fade(fade_s: number): boolean {
     const fading = this.all.map((form) => form.fade?.(fade_s) ?? false);
     return fading.includes(true);
@@ -138,7 +138,7 @@ export class Forms {
     return (traced?.isShown ? traced : marched)?.shown() ?? [];
   }
 
-  /** Whether a part of the frame is missing, and not only coarse. */
+  /** Whether some data of the frame is not drawn at all, not even at a coarse resolution. */
   get isIncomplete(): boolean {
     return !this.overview.isComplete || this.all.some(({ isIncomplete = false }) => isIncomplete);
   }
@@ -148,12 +148,12 @@ export class Forms {
     for (const form of this.all) form.forget?.();
   }
 
-  /** Called before each frame. */
+  /** Updates the materials of all forms; called before each frame. */
   updateMaterials(): void {
     for (const form of this.all) form.updateMaterials?.();
   }
 
-  /** Streams files for a view, down to an error on screen. */
+  /** Fetches the files that a view needs to keep its error on screen, and drops the others. */
   stream(view: StreamView): void {
     for (const form of this.all) form.stream?.(view);
   }
@@ -162,7 +162,10 @@ export class Forms {
 /** Largest widening of the view for additions on each side, as a multiple of the specimen's longest edge. */
 const WIDEST = 0.5;
 
-/** Returns the corners of the box around the additions of a layer (um, world), limited to WIDEST. */
+/**
+ * Returns the corners (um, world) of the box around the additions of a stage layer. The box extends
+ * the specimen's box by at most WIDEST on each side.
+ */
 function addedCorners({ additions, specimen: { bounds_um } }: Manifest): readonly Vec3[] {
   if (additions === undefined) return [];
   const longest = Math.max(...bounds_um.max.map((v, k) => v - bounds_um.min[k]));

@@ -20,8 +20,8 @@ const LONGEST_FRAME_S = 0.1;
  */
 const LONGEST_FADE_S = 1;
 /**
- * Smallest share of the frame's pixels along an edge at which the specimen may turn by itself.
- * Volumes with fewer pixels look like blocks.
+ * Smallest ratio, along an edge, of marched pixels to the frame's pixels at which the specimen may
+ * turn by itself. Volumes with fewer pixels look like blocks.
  */
 const MIN_TURNING = 0.5;
 
@@ -50,7 +50,7 @@ export class FrameLoop {
   private hasNews = false;
   /** Whether the previous frame was part of a motion, so that it was drawn within a budget. */
   private wasMoving = false;
-  /** Whether the last pass of the loop drew a frame. */
+  /** Whether the last call of `frame` drew anything. Frames are skipped while nothing changes. */
   private hasDrawn = false;
   private waiting: (() => void)[] = [];
   private drawn: (() => void)[] = [];
@@ -154,7 +154,7 @@ export class FrameLoop {
     const isMoving = isStereo || this.isStale;
     // after a motion, one more frame is drawn in full quality
     const isWanted = isMoving || this.wasMoving || isGathering || isDue;
-    // the levels "high" and "low" are the same in all frames
+    // with the quality "high" or "low", a view at rest is not refined by further frames
     const canGather = this.options.shown().state.quality === "auto" && picture.canGather;
     const gathers = !isWanted && canGather && this.resting.isDue(time_ms);
     // a caller waits for a complete view: missing files are streamed, and a complete view is not
@@ -170,7 +170,7 @@ export class FrameLoop {
       this.hasNews = isFading;
       forms.updateMaterials();
       const { passes } = this.gathering;
-      // late frames first lose their smooth edges
+      // a moving view has smooth edges only while the number of steps is not reduced
       const isSmooth = !isMoving || settings.steps >= MAX_STEPS;
       this.scene.draw({ resolution: settings.resolution, isMoving, passes, isSmooth, gathers });
       if (isGathering) this.gathering.submit(time_ms);
@@ -236,7 +236,10 @@ export class FrameLoop {
   }
 }
 
-/** Returns the steps of the march that stands in for path tracing; null: as many as the budget allows. */
+/**
+ * Returns the number of steps per ray of the march that is shown until path tracing has an image.
+ * The user sets it; null: as many as the time budget of a frame allows.
+ */
 function stepsOf({ mode, trace: { steps } }: ViewerState): number | null {
   return isTraced({ mode }) && steps > 0 ? Math.min(REST_STEPS, Math.ceil(steps)) : null;
 }

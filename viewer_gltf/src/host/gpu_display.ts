@@ -86,7 +86,10 @@ export class GpuDisplay implements Display {
     this.loop.start();
   }
 
-  /** Updates everything but the parts to a state. */
+  /**
+   * Updates the scene, stereo and the quality to a state. The host updates the parts of the viewer
+   * itself.
+   */
   sync(state: ViewerState): void {
     const { isolated, selected, quality, eyeDistance_mm, stereoStrength } = state;
     this.stereo.setEyes({
@@ -195,7 +198,7 @@ export class GpuDisplay implements Display {
 
   /** Makes new textures and timers after the graphics context was restored. */
   renew(): void {
-    this.forms.forget(); // textures that were made since the loss
+    this.forms.forget(); // drops textures that were made while the context was lost
     this.loop.renew();
     this.options.sync();
   }

@@ -115,7 +115,7 @@ export class Host implements PartHost {
     this.parts.begin();
   }
 
-  /** Called when the view of the address is open. */
+  /** Called once, when the viewer has the settings and the camera of the page's address. */
   noteOpening(): Promise<void> {
     return this.parts.afterOpening();
   }

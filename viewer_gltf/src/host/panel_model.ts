@@ -38,14 +38,17 @@ export type PanelSource = Readonly<{
   sections: (view: PanelView) => readonly PartSection[];
 }>;
 
-/** Returns whether a change replaces the channels that have a card by those that are shown. */
+/**
+ * Returns whether a change of the panel gives cards to the channels that are shown now, and removes
+ * the cards of all others.
+ */
 const renewsCards = (change: PanelChange) =>
   change.panel === "find" || (change.panel === "unfold" && change.section === "channels");
 
 export class PanelModel {
   /** State of the panel in the page. A panel in the scene has its own. */
   view: PanelView = START_VIEW;
-  /** Ranges by channel, in the values of the source. */
+  /** By channel, the voxel values of the source that are 0 and 255 in a volume. */
   readonly ranges: Ranges;
   private readonly changed = new Signal<void>();
   private readonly shownByPage = new Signal<void>();

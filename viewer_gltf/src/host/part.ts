@@ -42,7 +42,7 @@ export type FrameView = Readonly<{
   head: Matrix4;
   /** Matrix from um to metres of the scene. */
   specimen: Matrix4;
-  /** null in stereo. */
+  /** The flat view; null in stereo. */
   screen: FlatScreen | null;
   /** Ray straight ahead, um. */
   gaze: Ray;
@@ -64,7 +64,7 @@ export type FrameView = Readonly<{
 export type PartScene = Readonly<{
   /** Group in the space of the specimen: um, world. */
   group: Object3D;
-  /** Objects that are not in the depth pass. */
+  /** Objects that the depth pass leaves out, so that they do not hide volumes behind them. */
   overlays: readonly Object3D[];
   /** A number that changes when the part's opaque objects change; 0: it has none. */
   solid: number;
@@ -72,7 +72,7 @@ export type PartScene = Readonly<{
   isStanding: boolean;
 }>;
 
-/** The place where a ray hits a part. */
+/** The point where a ray hits something that a part of the viewer shows. */
 export type Hit = Probed &
   Readonly<{
     /** The object of a label map that is hit; absent: none. */
@@ -83,7 +83,7 @@ export type Hit = Probed &
 export type Tap = Readonly<{
   ray: Ray;
   by: "pointer" | "key" | "hand" | "gaze";
-  /** Time on the clock of the page, ms. */
+  /** Time of the choice on the clock of the page's events, ms. */
   time_ms: number;
 }>;
 
@@ -93,7 +93,10 @@ export type Tap = Readonly<{
  */
 export type TapAnswer = "used" | "shared" | null;
 
-/** Functions by the name of the command. A function that returns false leaves the command to others. */
+/**
+ * Functions by the name of the command. A function that returns false leaves the command to the
+ * other parts.
+ */
 export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;
 
 /**
@@ -123,7 +126,7 @@ export interface Part {
   readonly id: string;
   /** Called once, when all parts have been made. */
   begin?(): void;
-  /** Called once, when the view of the address is open. */
+  /** Called once, when the viewer has the settings and the camera of the page's address. */
   afterOpening?(): unknown;
   /** Called once, when the overview is on screen. Parts load here what the first view does not need. */
   afterOverview?(): unknown;
@@ -132,7 +135,9 @@ export interface Part {
   /** Advances animations, before each frame. */
   advance?(frame: FrameView): void;
   readonly scene?: PartScene;
-  /** Returns the planes in front of which the specimen is cut away for an eye, um. */
+  /**
+   * Returns clip planes for an eye (um). Everything between the eye and such a plane is not drawn.
+   */
   cutBefore?(eye: Vec3): readonly ClipPlane[] | undefined;
   /** Returns the nearest hit of a ray (um); null: none. */
   pick?(ray: Ray): Hit | null;
@@ -156,7 +161,7 @@ export interface Part {
   dispose(): void;
 }
 
-/** A part as it is registered. */
+/** The data by which a part of the viewer is registered, and the function that makes the part. */
 export type PartDefinition = Readonly<{
   id: string;
   keys?: readonly KeyGroup[];
@@ -168,7 +173,7 @@ export type PartDefinition = Readonly<{
   commands?: readonly Command[];
   /** Settings and actions that the part adds to the state. */
   settings?: PartSettings;
-  /** Buttons that solve the part's refusals. */
+  /** By the text of a refusal, the button that removes its cause. */
   remedies?: Remedies;
   create: (host: PartHost) => Part;
 }>;

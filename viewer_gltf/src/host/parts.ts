@@ -14,7 +14,10 @@ import type { Services } from "./services";
 
 const LAST = Number.POSITIVE_INFINITY;
 
-/** Orders parts by rank, because others use their services and are updated after them. */
+/**
+ * Orders parts by rank, lowest first. Parts with a high rank use the services of those with a low
+ * rank, and are updated after them.
+ */
 export function inOrder(definitions: readonly PartDefinition[]): readonly PartDefinition[] {
   const place = ({ rank = LAST }: PartDefinition) => rank;
   return definitions.toSorted((a, b) => (place(a) < place(b) ? -1 : Number(place(a) > place(b))));

@@ -65,7 +65,11 @@ export class SceneFrame {
     stereo.followScreen(this.picture.eyes, camera, controls.target);
   }
 
-  /** Follows the gaze, and advances motions and fades. Returns whether each goes on. */
+  /**
+   * Chooses volumes by the gaze, and advances motions and fades by some seconds. Returns whether
+   * the specimen or the focus disc still moves (`isChanging`), and whether anything still fades
+   * (`isFading`).
+   */
   advance(dt_s: number, fade_s = dt_s): Readonly<{ isChanging: boolean; isFading: boolean }> {
     const { hybrid, specimenScene, onFocus } = this.options;
     const { forms, stereo, viewpoint, state } = this.options.shown();

@@ -41,13 +41,15 @@ export interface ObjectMaps {
    * null: not loaded yet.
    */
   linked(channel: string, view: ObjectView): Readonly<{ text: string; leftOut: number }> | null;
-  /** Rows of the shown objects, by channel. */
+  /**
+   * For each channel, the numbers of its objects' rows in the table; only objects that are shown.
+   */
   readonly rowsShown: ReadonlyMap<string, readonly number[]>;
   /** Returns the number of a channel's objects that are shown; null: their table is not loaded yet. */
   shownCount(channel: string): number | null;
 }
 
-/** Images of the view. */
+/** Makes images of the view. */
 export interface PosterMaker {
   /**
    * Makes an image of the screen, with a longest edge of at most `longest_px` pixels. Rejects with
@@ -74,13 +76,13 @@ export interface PagePanel {
   perform(request: Request | Refusal): void;
   /** Focuses a control, also in a hidden panel. Returns whether it exists. */
   focus(section: string, control: string): boolean;
-  /** Shows an announcement only on the page. */
+  /** Shows an announcement on the page, and not in stereo. */
   showAnnouncement(words: string): void;
   /** Adds a button to the last announcement. */
   offer(words: string, label: string, act: () => void): void;
 }
 
-/** The buttons that solve a refusal. */
+/** Finds the button that removes the cause of a refusal. */
 export interface MessageButtons {
   /** Returns the button of a refusal; null: it has none. */
   buttonFor(refusal: string): Promise<Readonly<{ label: string; act: () => void }> | null>;
@@ -148,7 +150,7 @@ export interface Links {
 
 /** The result of the benchmark. */
 export interface BenchResult {
-  /** null: the benchmark has not run. */
+  /** The report of the benchmark; null: it has not run. */
   readonly report: object | null;
 }
 

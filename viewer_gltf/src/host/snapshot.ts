@@ -17,7 +17,7 @@ export type Snapshot = Readonly<{
   state: ViewerState;
   /** Pose of the flat camera, in metres of the scene. */
   look: CameraPose;
-  /** Whether all tiles of the first channel are shown. */
+  /** Whether all tiles of the first shown channel are on screen. */
   hasFirstPicture: boolean;
   /** Loading progress of the overviews of all shown channels. */
   overview: Progress;

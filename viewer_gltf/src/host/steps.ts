@@ -8,7 +8,7 @@ import type { ViewerState } from "../state/viewer_state";
 
 export type Moment = Readonly<{
   state: ViewerState;
-  /** null: the opening camera. */
+  /** The camera at this moment; null: the camera of the opening view. */
   camera: CameraView | null;
   /** Whether the user was in stereo. The camera has no meaning there, because the head looks. */
   isInStereo: boolean;
@@ -51,7 +51,7 @@ export class Steps {
     return this.history.future[0]?.name ?? null;
   }
 
-  /** Makes a step of a move of the camera since the last step, if there was one. */
+  /** If the camera has moved since the last step, adds an undo step for that move. */
   note(): void {
     const moment = this.now();
     if (moment.isInStereo || isSame(moment.camera, this.seenFrom)) return;
@@ -59,7 +59,7 @@ export class Steps {
     this.seenFrom = moment.camera;
   }
 
-  /** Adds a step; called before the state changes. */
+  /** Adds an undo step with the present state and camera; called before the state changes. */
   add(name: string, key: string | null): void {
     this.note();
     this.push(this.now(), name, key);
@@ -75,7 +75,7 @@ export class Steps {
     return this.take(redone(this.history, moment));
   }
 
-  /** The newest step, which marks a place in the history; null: none. */
+  /** The newest step, as a mark from which `since` counts; null: there are no steps. */
   get newest(): object | null {
     return this.history.past.at(-1) ?? null;
   }

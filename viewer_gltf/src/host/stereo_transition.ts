@@ -28,7 +28,8 @@ export class StereoTransition {
    * Turns the side of the specimen that faces the screen to the head, with the middle of the view
    * straight ahead.
    *
-   * @param larger factor to the opening size, unless the user has resized the specimen
+   * @param larger factor to the specimen's size in stereo; has no effect if the user has moved or
+   * resized the specimen
    * @param table upright place in the user's own room; null: in front of the eyes
    */
   enter(larger = 1, table: HandPose | null = null): void {
@@ -85,7 +86,10 @@ export class StereoTransition {
     this.specimen.moveTo(pose, this.navigation.camera.position);
   }
 
-  /** The flat camera as a hand that holds the point it turns around. */
+  /**
+   * Pose of an imagined hand at the point that the flat camera turns around, with the camera's
+   * orientation.
+   */
   private get screenHold(): HandPose {
     const { target, object } = this.navigation.controls;
     return { position: target, orientation: object.quaternion };

@@ -50,7 +50,7 @@ export class Taps {
     const answer = this.parts.tap(tap);
     if (answer === "used") return true;
     const tile = pickTile(ray, shownTiles(tiles, state.isolated), state.clip)?.id ?? null;
-    // a single tile needs no selection
+    // a tap selects a tile only if the specimen has several tiles
     if (answer === null && tiles.length > 1 && tile !== null) {
       this.host.dispatch({ type: "select", tile });
     }

@@ -49,7 +49,7 @@ export class Undo {
     return this.steps.redoes;
   }
 
-  /** Makes a step of a move of the camera since the last step, if there was one. */
+  /** If the camera has moved since the last step, adds an undo step for that move. */
   noteCameraMove(): void {
     this.steps.note();
   }
@@ -87,7 +87,7 @@ export class Undo {
     return !isSameView(state, now()) || !isSameCameraPose(look, viewpoint.navigation);
   }
 
-  /** The newest step of the history, which marks a place in it. */
+  /** The newest undo step, from which `takeBack` counts the steps to undo; null: there are none. */
   get newest(): object | null {
     return this.steps.newest;
   }
@@ -96,7 +96,8 @@ export class Undo {
   takeBack({ state, camera, newest }: Mark): void {
     const { viewpoint, isInStereo, onChange } = this.options;
     if (!isSameView(state, this.options.state())) {
-      // a change that was joined to the previous step made no step of its own
+      // at least one step is undone: a change that was joined to the step before the mark added no
+      // step
       for (let left = Math.max(1, this.steps.since(newest)); left > 0; left--) this.step("undo");
     }
     if (!isInStereo()) viewpoint.restore(camera);

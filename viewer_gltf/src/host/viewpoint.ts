@@ -90,12 +90,15 @@ export class Viewpoint {
     this.options.onChange();
   }
 
-  /** Returns whether the flat camera has a pose. */
+  /** Returns whether the flat camera is at a given pose. */
   isAt(look: CameraPose): boolean {
     return isSameCameraPose(look, this.navigation);
   }
 
-  /** The present named view; null: the user has moved the camera. */
+  /**
+   * The named view in which the camera is now, such as "front"; null: the user has moved the
+   * camera.
+   */
   get standing(): NamedView | null {
     return this.navigation.namedView;
   }
@@ -111,7 +114,7 @@ export class Viewpoint {
     this.options.onChange();
   }
 
-  /** Returns the place of a point (um) in the flat view, -1..1, and its depth. */
+  /** Projects a point (um) into the flat view: x and y in -1..1, and the depth. */
   project(point: Vec3): Vector3 {
     return new Vector3(...point).applyMatrix4(this.specimen).project(this.navigation.camera);
   }
@@ -167,7 +170,10 @@ export class Viewpoint {
     this.options.onChange();
   }
 
-  /** Returns the specimen to its opening place: in stereo straight in front of the head, at its height. */
+  /**
+   * Moves the specimen back to its opening position: in stereo straight in front of the head, at
+   * its height.
+   */
   recentre(): void {
     const { specimen } = this.options;
     const stereo = this.options.stereo();

@@ -15,7 +15,7 @@ export type Item = Readonly<{
   /** Number of bytes that have arrived, and of all bytes of the upload. */
   bytes: number;
   total: number;
-  /** Whether the server reads another item first. */
+  /** Whether the item waits until the server has read another item. */
   waits: boolean;
   /** Position in the queue of builds, from 1; 0: the item is not in the queue. */
   place: number;

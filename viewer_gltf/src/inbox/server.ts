@@ -25,14 +25,17 @@ export type Choices = Readonly<
     series: string;
     background: string;
     title: string;
-    /** x, y, z */
+    /** Voxel spacing along x, y, z. */
     spacing_um: readonly number[];
   }>
 >;
 
 export type Command = "pause" | "continue" | "cancel";
 
-/** Progress of an upload. */
+/**
+ * An upload that has begun: the ID of its item, and the number of bytes that the server already
+ * has.
+ */
 export type Begun = Readonly<{ id: string; offset: number }>;
 /** The answer to a piece. `offset` is the number of bytes that have arrived; null: the server does not state it. */
 export type PieceAnswer = Readonly<{ status: number; offset: number | null; line: string }>;
@@ -67,7 +70,7 @@ export class Server {
     await this.json("PUT", `items/${id}/choices`, choices);
   }
 
-  /** Returns the folder of the view, below this page. */
+  /** Requests a view of an item. Returns the folder of the view, below this page. */
   async look(id: string): Promise<string> {
     const answer = (await this.json("POST", `items/${id}/look`)) as { page?: unknown } | null;
     const page = pageOf(answer?.page);

@@ -17,7 +17,7 @@ export type Understood = Readonly<{
   title: string;
   format: string;
   modality: string;
-  /** x, y, z */
+  /** Number of voxels along x, y, z. */
   voxels: readonly number[];
   spacing_um: readonly number[];
   sizeText: string;

@@ -10,7 +10,7 @@ export type Progress = Readonly<{
   doing: "waiting" | "sending" | "lost" | "refused" | "cancelled" | "complete";
   sent: number;
   total: number;
-  /** Time until the end, s; null: not known. */
+  /** Time until all bytes are sent, s; null: not known. */
   left_s: number | null;
   /** Why the upload is lost or refused; empty: it is neither. */
   line: string;

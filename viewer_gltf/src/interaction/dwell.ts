@@ -12,7 +12,7 @@
  */
 import { dot, type Vec3 } from "../math/vec3";
 
-/** The target that a ray hits in one frame, and its place. */
+/** The target that a ray hits in one frame, and the target's position in its layout. */
 export type RaySample = Readonly<{
   /** Key of the target; null if there is none that can be chosen. */
   target: string | null;
@@ -45,7 +45,7 @@ export type Dwell = Readonly<{
    * seen yet.
    */
   began: Vec3 | null;
-  /** Null while the time counts. */
+  /** State of a spent dwell, which does not fire; null while the time of the gaze counts. */
   spent: Spent | null;
 }>;
 

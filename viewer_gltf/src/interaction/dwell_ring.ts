@@ -46,7 +46,10 @@ export class Ring {
     DARK,
     0.6,
   );
-  /** Clockwise from the top, like a clock. */
+  /**
+   * The light dot and ring. The ring's triangles are in order clockwise from the top, so that a
+   * part of them shows the progress.
+   */
   private readonly light = flat(
     new CircleGeometry(DOT_DEG / DIAMETER_DEG, DOT_PARTS),
     new RingGeometry(INNER_RADIUS, 1, PARTS, 1, Math.PI / 2, -2 * Math.PI),

@@ -10,7 +10,10 @@ export const FARTHEST_M = 8;
 /** Radians of the slow turn at the opening to either side, and seconds of one full swing. */
 const SWAY_RAD = Math.PI / 10;
 const SWAY_S = 30;
-/** Parts of a swing at which the eye may be farthest from the specimen. */
+/**
+ * Moments of the opening's swing, as shares of its period, at which the eye may be farthest from
+ * the specimen.
+ */
 const TURNED = [-0.25, -0.125, 0, 0.125, 0.25];
 
 /** The named views. A named view follows the window's shape until the user moves. */

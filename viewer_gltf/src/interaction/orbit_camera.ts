@@ -103,7 +103,7 @@ export class Navigation {
     if (this.shownView !== null) this.showNamedView(this.shownView);
   }
 
-  /** Shows the whole specimen as in the opening. */
+  /** Returns to the view with which the page opens, which shows the whole specimen. */
   reset(): void {
     this.stopTurning();
     this.showNamedView(this.home);
@@ -193,7 +193,7 @@ export class Navigation {
     const { from, to } = this.flight;
     const elapsed_s = this.flight.elapsed_s + dt_s;
     const part = Math.min(1, elapsed_s / FLIGHT_S);
-    const share = part * part * (3 - 2 * part); // eases in and out
+    const share = part * part * (3 - 2 * part); // starts and ends slowly
     const between = (a: Vec3, b: Vec3) =>
       new Vector3(...a).lerp(new Vector3(...b), share).toArray() as Vec3;
     this.place({

@@ -33,7 +33,7 @@ export type Hit = Readonly<{
 
 /** Something that rays can hit: the panel, handles, the specimen's tiles. */
 export interface Target {
-  /** Whether it is drawn over nearer targets, so that it is hit before them. */
+  /** Whether the target is drawn over nearer targets, so that rays hit it before them. */
   readonly isOnTop: boolean;
   /**
    * A text that changes when a control of the target appears, disappears or moves; absent if it has

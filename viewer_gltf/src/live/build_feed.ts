@@ -1,4 +1,4 @@
-/** The websocket to the build whose views the page shows. */
+/** The websocket to the build whose intermediate bundles (views) the page shows. */
 import { LastingSocket } from "../dom/lasting_socket";
 import { type BuildState, readBuildState } from "./build_state";
 

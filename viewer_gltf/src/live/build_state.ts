@@ -1,4 +1,7 @@
-/** The state of the build whose views the page shows, as reported by the server. Pure. */
+/**
+ * The state of the build whose intermediate bundles (views) the page shows, as reported by the
+ * server. Pure.
+ */
 
 import { BUILD_STATES } from "../bundle/generated/build_states";
 
@@ -15,7 +18,10 @@ export type BuildState = Readonly<{
   share: number;
   /** Remaining time, s; null if unknown. */
   left_s: number | null;
-  /** The folder of the newest view, below the page; empty if it is the page's own folder. */
+  /**
+   * The folder of the newest intermediate bundle (view), below the page; empty if it is the page's
+   * own folder.
+   */
   folder: string;
   /** Whether the bundle is complete; the page's own address then leads to it. */
   hasBundle: boolean;

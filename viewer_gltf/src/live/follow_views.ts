@@ -1,4 +1,7 @@
-/** Shows the newest view of a source while the source is built. Views open one after the other. */
+/**
+ * Shows the newest view of a source while the source is built. A view is a bundle of what is
+ * finished so far. Views open one after the other.
+ */
 import type { BuildState } from "./build_state";
 
 /** Time after which a view that could not be shown is tried again, ms. */

@@ -51,7 +51,7 @@ export class ProgressLine {
 
   /**
    * @param state null if the server does not answer
-   * @param isShown whether the page shows the newest view of the build
+   * @param isShown whether the page shows the newest bundle of the build
    */
   update(state: BuildState | null, isShown: boolean): void {
     const doing = state?.doing ?? null;

@@ -1,4 +1,6 @@
-/** Shows how much of a source the server has read, while the page waits for the first view. */
+/**
+ * Shows how much of a source the server has read, while the page waits for the first bundle of it.
+ */
 
 /** Name in the server timing of the page while the server is still reading the source: see `isReading`. */
 const NAME = "stereocell-reading";

@@ -1,4 +1,7 @@
-/** Watches the build of the page's source: shows its progress, and each newer view of the specimen. */
+/**
+ * Watches the build of the page's source: shows its progress, and each newer bundle of the
+ * specimen.
+ */
 import type { LiveHost } from "../bundle/live_host";
 import { BuildFeed } from "./build_feed";
 import type { BuildState } from "./build_state";

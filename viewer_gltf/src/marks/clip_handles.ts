@@ -34,7 +34,7 @@ export type Handle = Readonly<{ id: HandleId; position: Vec3 }>;
 export const TOLERANCE_RAD = {
   mouse: 1.3 * HANDLE_RADIUS,
   touch: 2.2 * HANDLE_RADIUS,
-  /** Also for a hand's ray; head and hand both tremble. */
+  /** Tolerance for the gaze and for a hand's ray, because head and hand both tremble. */
   gaze: 2.8 * HANDLE_RADIUS,
 } as const;
 export type Pointing = keyof typeof TOLERANCE_RAD;
@@ -127,7 +127,8 @@ export function changeFace(
   const seen = boxWithin(box, shown);
   const place = change(seen, { axis, side })[side][axis];
   if (place === seen[side][axis]) return null;
-  // The other faces stay where they are, also outside the shown box.
+  // Only the dragged face moves. The other faces of the clip box stay in place, even if they lie
+  // outside the shown box.
   const corner: [number, number, number] = [...box[side]];
   corner[axis] = place;
   return { type: "set-clip", clip: { box: { ...box, [side]: corner }, plane } };

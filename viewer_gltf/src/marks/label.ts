@@ -78,7 +78,10 @@ export class Label {
     this.sprite.center.set(share, edge + (lines - up_lines) / Math.max(1, this.lines));
   }
 
-  /** Returns the label's box as an eye with these axes sees it, in lines. */
+  /**
+   * Returns the label's box as an eye with these axes (`right` and `up`) sees it, in heights of a
+   * text line.
+   */
   boxFrom({ eye_um }: Pick<EyeView, "eye_um">, right: Vector3, up: Vector3): LabelBox {
     const { position, scale, center } = this.sprite;
     const line = scale.y / Math.max(1, this.lines);

@@ -60,7 +60,10 @@ export type EyeView = Readonly<{
 /** Factor to the angles of labels in stereo: their letters are 32 mm high at 1 m, as on the panel. */
 export const STEREO_TEXT = 2.25;
 
-/** Returns the factor to angles on a flat screen with a number of CSS pixels for each radian. */
+/**
+ * Returns the factor by which the angles of marks are multiplied on a flat screen, from its CSS
+ * pixels for each radian.
+ */
 export function screenZoom(px_per_rad: number): number {
   return LABEL_PX / px_per_rad / LABEL_HEIGHT;
 }

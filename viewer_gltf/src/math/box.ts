@@ -4,7 +4,7 @@ import { AXES, type Ray, type Vec3 } from "./vec3";
 export type Box = Readonly<{ min: Vec3; max: Vec3 }>;
 /** Part of a ray, in multiples of its direction's length; entry before exit. */
 export type Span = readonly [number, number];
-/** The whole ray. */
+/** Span of a whole ray, from its origin to infinity. */
 export const AHEAD: Span = [0, Number.POSITIVE_INFINITY];
 
 export function centerOf({ min, max }: Box): Vec3 {

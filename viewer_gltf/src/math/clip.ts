@@ -8,7 +8,10 @@ import { AXES, along, dot, type Ray, type Vec3, withPart } from "./vec3";
  * to the removed side.
  */
 export type ClipPlane = Readonly<{ normal: Vec3; offset_um: number }>;
-/** The kept part; null: not clipped. `corner`: points beyond all of these planes are removed. */
+/**
+ * The cuts, um, world. The points inside `box` and behind `plane` are kept; null means that this
+ * cut is off. Points beyond all planes of `corner` are removed, too.
+ */
 export type Clip = Readonly<{
   box: Box | null;
   plane: ClipPlane | null;
@@ -81,7 +84,10 @@ export function behindPlane(points: readonly Vec3[], plane: ClipPlane): readonly
   });
 }
 
-/** Moves points that are outside clip and box to the nearest kept place. */
+/**
+ * Moves points that the clip removes, or that lie outside the box `within`, to the nearest kept
+ * point.
+ */
 export function keptPoints(
   points: readonly Vec3[],
   { box, plane }: Clip,
@@ -214,7 +220,10 @@ export function spinPlane(
   return aboutMiddle(plane, normal.normalize().toArray(), specimen);
 }
 
-/** The plane through the same middle with another normal. */
+/**
+ * Returns the clip plane that has another normal, and passes through the middle point of its
+ * handles as before.
+ */
 function aboutMiddle(plane: ClipPlane, normal: Vec3, specimen: Box): ClipPlane {
   const { middle } = planeHandles(plane, specimen, 0);
   return withinSpecimen(normal, dot(normal, middle), specimen);

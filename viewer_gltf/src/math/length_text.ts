@@ -1,7 +1,10 @@
 /** Lengths as text, in nm, um or mm. */
 const DIGITS = 3;
 
-/** mm from 1000 um on, nm below 1 um. */
+/**
+ * Returns the unit in which a length is written, and the factor from um to it: mm from 1000 um on,
+ * nm below 1 um, otherwise um.
+ */
 function lengthUnitOf(rounded_um: number): readonly [string, number] {
   return rounded_um >= 1000 ? ["mm", 1e-3] : rounded_um < 1 ? ["nm", 1e3] : ["µm", 1];
 }

@@ -45,7 +45,7 @@ function tenTo(exponent: number): number {
   return exponent < 0 ? 1 / 10 ** -exponent : 10 ** exponent;
 }
 
-/** mm from 1000 um on, nm below 1 um. */
+/** Returns the text of a length: in mm from 1000 um on, in nm below 1 um, otherwise in um. */
 function labelOf(mantissa: number, exponent: number): string {
   const [unit, shift] = exponent >= 3 ? ["mm", -3] : exponent < 0 ? ["nm", 3] : ["µm", 0];
   return `${mantissa * tenTo(exponent + shift)} ${unit}`;

@@ -16,10 +16,10 @@ import type { ChannelState } from "../state/viewer_state";
 
 export type SharedChannel = Readonly<{
   visible: boolean;
-  /** `#rrggbb`. */
+  /** Colour of the channel as `#rrggbb`. */
   color: string;
   opacity: number;
-  /** Low and high end, in values of the source. */
+  /** Low and high end of the channel's window, in values of the source. */
   window: readonly [number, number];
 }>;
 type SharedView = Readonly<{ eye_um: Vec3; target_um: Vec3 }>;

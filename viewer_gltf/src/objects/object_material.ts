@@ -161,7 +161,8 @@ export class ObjectMaterial {
     geometry.setAttribute(ROW, new Float32BufferAttribute(rows, 1));
     geometry.deleteAttribute(FEATURE);
     geometry.setAttribute(OUTWARDS, new BufferAttribute(outwards(geometry, rows), 3, true));
-    // all glb files of a bundle have the same scale
+    // every glb file of a bundle has the same scale, so the inset in its units is equal for all
+    // meshes
     this.uniforms.uInset.value = this.inset_um / (scale.x * UM_PER_METRE);
     return true;
   }

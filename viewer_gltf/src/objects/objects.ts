@@ -29,7 +29,7 @@ export type ObjectsOptions = Readonly<{
   file: FileRef;
   /** The drawn surfaces; null: the viewer has no part that draws surfaces. */
   surfaces: Surfaces | null;
-  /** Its matrix leads from um to the scene. */
+  /** The scene object that contains the specimen; its matrix maps um to metres of the scene. */
   specimen: Object3D;
   dispatch: (change: ObjectChange, isStep?: boolean) => void;
   /** Flies to the box of an object, in um. `isSeen` returns whether no other object hides it from an eye. */

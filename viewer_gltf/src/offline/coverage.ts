@@ -1,6 +1,7 @@
 /**
- * Computes how much of a specimen a visit without a network would show. A tile counts if it is kept at the finest level
- * that was shown anywhere, since a user expects to find that level everywhere. Pure.
+ * Computes how much of a specimen a visit without a network would show. A tile counts if it is kept
+ * at the finest level of detail that was shown anywhere, since a user expects to find that level
+ * everywhere. Pure.
  */
 import { type Asked, keyOf } from "../bundle/request_log";
 
@@ -10,7 +11,7 @@ export type Levels = Readonly<{ tile: string; levels: readonly (readonly Asked[]
 export type Layer = readonly Levels[];
 
 export type Coverage = Readonly<{
-  /** Number of tiles that are kept, at the finest level that was shown. */
+  /** Number of tiles that are kept at the finest level of detail that was shown. */
   tiles: number;
   /** Whether the host makes the shown volumes for each view, so that none of them can be kept. */
   isByView?: boolean;

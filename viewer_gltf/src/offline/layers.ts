@@ -1,4 +1,4 @@
-/** Lists the files that a user may need from the present view on, by tile and level. */
+/** Lists the files that a user may need from the present view on, by tile and level of detail. */
 import { fileAddress } from "../bundle/fetch";
 import type { Channel } from "../bundle/generated/bundle";
 import type { Asked } from "../bundle/request_log";

@@ -9,7 +9,8 @@ class OfflinePart implements Part {
 
   async afterOverview(): Promise<void> {
     const { bundle } = this.host;
-    // Not for a view of a source that is being built, nor for a bundle that the page itself has made.
+    // Nothing is kept of a source that is still being built, or of a bundle that the page itself
+    // has made.
     if (bundle.live !== undefined || isHeld(bundle.base)) return;
     const { KeepOffline } = await import("./keep_offline");
     await KeepOffline.start(this.host);

@@ -10,7 +10,10 @@ import { arAddress, EntryButtons } from "../panel/html/entry_buttons";
 import { Announcement, BackButton, FirstHint, Notices, ProgressBar } from "../panel/html/overlays";
 import { wayToStereo } from "../xr/support";
 
-/** Whether the user has touched the page. It stays true if a newer view replaces this one. */
+/**
+ * Whether the user has touched the page. It stays true if a newer bundle of the specimen replaces
+ * the shown one.
+ */
 let wasTouched = false;
 
 export class Overlays {

@@ -44,7 +44,8 @@ class PagePart implements Part, PagePanel {
     host.changed.subscribe(() => this.refresh());
     host.panel.onChange(() => this.refresh());
     host.drawn.subscribe(() => this.refreshSoon());
-    // a link to another view of the same bundle: all other settings are those of the opening
+    // the user has opened a link to the same bundle; a reload resets all settings that the link
+    // does not contain
     addEventListener("hashchange", () => location.reload(), { signal });
     host.canvas.addEventListener("webglcontextlost", () => {
       void import("./lost_context").then(({ offerReload }) =>

@@ -24,7 +24,9 @@ type Turn = (typeof TURNS)[number];
  */
 export type ClipPart = BoxHandleId | "plane-middle" | Turn;
 
-/** Step of a key, as a share of the edge of the shown box. */
+/**
+ * Distance that one press of a key moves a face or the plane, as a share of the shown box's edge.
+ */
 const STEP = 0.02;
 const STEP_RAD = Math.PI / 36;
 const AXIS_NAMES = ["x", "y", "z"] as const;
@@ -36,18 +38,24 @@ export function clipPartsOf({ box, plane }: Clip): readonly ClipPart[] {
   ];
 }
 
-/** Returns the chosen part: the picked one if it still exists, else the first. */
+/**
+ * Returns the part of the cuts that the keys change: the picked one if it still exists, else the
+ * first.
+ */
 export function chosenClipPart(clip: Clip, picked: ClipPart | null): ClipPart | undefined {
   const clipParts = clipPartsOf(clip);
   return clipParts.find((clipPart) => clipPart === picked) ?? clipParts[0];
 }
 
-/** Returns the handle of a part in the scene. */
+/** Returns the handle in the scene that moves the same part of the cuts. */
 export function handleOf(clipPart: ClipPart): HandleId {
   return isTurn(clipPart) ? "plane-tip" : clipPart;
 }
 
-/** @param steps negative: backwards @returns null at the limit */
+/**
+ * @param steps number of steps; negative: backwards @returns the cuts after the move; null: the
+ * part is at its limit
+ */
 export function moveClipPart(
   clipPart: ClipPart,
   steps: number,

@@ -102,7 +102,10 @@ export const START_VIEW: PanelView = {
 };
 
 type Base = Readonly<{
-  /** Unique in the panel; for a channel's control: channel/part. */
+  /**
+   * ID that is unique in the panel. For a channel's control, it is the channel's ID, a slash and
+   * the control's own name.
+   */
   id: string;
   label: string;
   /** Label for places without the group's name around it: for screen readers and gaze. */
@@ -117,7 +120,10 @@ type Base = Readonly<{
 
 export type Toggle = Base &
   Readonly<{ kind: "toggle"; value: boolean; to: (value: boolean) => Request }>;
-/** `value` is 0..1, in `steps` steps; `text` is the value in its own unit. */
+/**
+ * `value` is the knob's position, 0..1. An arrow key moves it by 1 / `steps`. `text` is the
+ * parameter's value with its unit.
+ */
 export type Slider = Base &
   Readonly<{
     kind: "slider";
@@ -126,7 +132,7 @@ export type Slider = Base &
     text: string;
     to: (value: number) => Request;
   }>;
-/** Two ends of a range, each with a value as a slider has it. */
+/** A slider with two knobs for the ends of a range, each with a position 0..1. */
 export type Window = Base &
   Readonly<{
     kind: "window";
@@ -174,7 +180,7 @@ export type Button = Base &
 export type MapTile = Readonly<{
   id: string;
   name: string;
-  /** Name of the tile where it stands alone. */
+  /** Name of the tile with a capital letter, for places that show nothing else beside it. */
   title: string;
   row: number;
   column: number;
@@ -201,22 +207,28 @@ export type Histogram = Readonly<{
 export type HistogramEditor = Base &
   Readonly<{
     kind: "histogram";
-    /** null: not loaded yet. */
+    /** The joint histogram that is drawn; null: not loaded yet. */
     histogram: Histogram | null;
-    /** The range of the histogram's values that fills the width. */
+    /** The range of intensities (0..1) that fills the width of the drawing. */
     window: readonly [number, number];
     shapes: Shapes;
     selected: number | null;
     /** Linear colour of the channel. */
     color: Rgb;
-    /** Lower and upper end of the values, and the steepest gradient. */
+    /**
+     * Labels of the axes: the intensity at the left and at the right end, and the gradient
+     * magnitude at the top.
+     */
     texts: readonly [string, string, string];
     /** @param reach largest distance to a corner or an edge */
     press: (at: HistogramPoint, reach: HistogramPoint) => Request;
-    /** null: nothing changes. */
+    /** Returns the request of a drag to a point of the histogram; null: nothing changes. */
     drag: (at: HistogramPoint) => Request | null;
   }>;
-/** A drawing that only its owner can make. Places are shares of its width and height, from the upper left. */
+/**
+ * A drawing that the part of the viewer which owns it makes itself. Places are shares of its width
+ * and height, from the upper left.
+ */
 export type Picture = Base &
   Readonly<{
     kind: "picture";
@@ -228,7 +240,10 @@ export type Picture = Base &
     /** The content in words. */
     text: string;
     press: (x: number, y: number) => Request;
-    /** null: nothing changes; absent: the picture takes presses only. */
+    /**
+     * Returns the request of a drag to a point; null: nothing changes. Absent: the picture takes
+     * presses only.
+     */
     drag?: (x: number, y: number) => Request | null;
   }>;
 /** A text that can only be read. */
@@ -290,9 +305,9 @@ export type Section = Readonly<{
 /** A section as the panel's own lists and the parts define it. */
 export type PartSection = Pick<Section, "id" | "label" | "items"> &
   Readonly<{
-    /** Place among the sections; the panel's own have multiples of ten. */
+    /** Number by which sections are ordered; those of the panel itself have multiples of ten. */
     rank: number;
-    /** Absent: the section is listed with the first ones. */
+    /** Whether a flat screen lists the section under *More*; absent: it does not. */
     isDeeper?: boolean;
   }>;
 

@@ -43,8 +43,8 @@ export function editedShapes(functions: Functions): Shapes {
 }
 
 /**
- * Returns the shapes to which another one is added: the user's own shapes, even if they are not
- * chosen now.
+ * Returns the list to which a new shape is added. If a one-dimensional function is chosen, that is
+ * the list of the user's own function.
  */
 function editableShapes(functions: Functions): Shapes {
   return shapesOf(functions, editedName(functions));

@@ -22,7 +22,7 @@ export type Content = Readonly<{
   /** Outermost points of a channel as it is shown now, um; null: not known. */
   outline: (channel: ChannelState) => readonly Vec3[] | null;
   hasSurface: (channel: string, tile: string) => boolean;
-  /** null: not known yet. */
+  /** Returns whether a channel has a volume in a tile; null: not known yet. */
   hasVolume: (channel: string, tile: string) => boolean | null;
   /** Number of objects of a label map that are shown; null: not known yet. */
   shownObjectCount: (channel: string) => number | null;

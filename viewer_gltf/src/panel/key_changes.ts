@@ -3,7 +3,10 @@ import type { Refusal } from "./controls";
 import { no } from "./key";
 import type { KeyChanges, KeyTable } from "./keys";
 
-/** The key of the list of keys cannot change, so that everybody finds the way back. */
+/**
+ * The key that opens the list of keys. Users cannot change it, so that they can always open the
+ * list and restore their keys.
+ */
 export const FIXED = "?";
 /** Keys that operate controls, or that the browser uses. */
 const TAKEN = /^(Shift\+)?(Tab|Enter|Escape| |F\d+)$|^Ctrl\+/;

@@ -5,8 +5,8 @@ type Pressed = Pick<KeyboardEvent, "key" | "code" | "shiftKey"> &
 
 /**
  * Returns the name of a pressed key: `KeyboardEvent.key`, with Shift if the key does not show it,
- * and with Ctrl for Ctrl and for Command on a Mac. On a keyboard without Latin letters, the place
- * of the key counts.
+ * and with Ctrl for Ctrl and for Command on a Mac. On a keyboard without Latin letters, the name is
+ * that of the key in the same position on a Latin keyboard.
  */
 export function keyName(pressed: Pressed): string {
   const name = plainName(pressed);

@@ -47,7 +47,10 @@ export class KeyTable {
     );
   }
 
-  /** Returns the name in the tables of a pressed key; null: it has no function. */
+  /**
+   * Returns the name, in the tables, of the key whose function a pressed key has; null: the pressed
+   * key has no function.
+   */
   standsFor(pressed: string, changes: KeyChanges): string | null {
     const changed = Object.keys(changes).find((name) => changes[name] === pressed);
     if (changed !== undefined) return changed;

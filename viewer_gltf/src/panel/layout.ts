@@ -18,11 +18,14 @@ export type Facts = Readonly<{
   /** Bounds of the specimen or the isolated tile, um, world. */
   shown: Box;
   isStereo: boolean;
-  /** null: not known yet. */
+  /** Time between two frames of a motion, ms; null: not known yet. */
   frame_ms: number | null;
   settings: QualitySettings | null;
   triangles: number;
-  /** Finest level of the volumes on screen; 0 is the finest of all. null: no volume. */
+  /**
+   * Finest resolution level (mip level) of the volumes on screen, where 0 is full resolution; null:
+   * no volume is on screen.
+   */
   volumeLevel: number | null;
   /** Samples per pixel of the path-traced image; null: path tracing is off. */
   samples: number | null;
@@ -95,7 +98,7 @@ export function objectsSection(channel: string, count: number): string {
 export const labelMapsOf = ({ channels }: ViewerState) =>
   channels.filter(({ shown, hasObjects }) => shown && hasObjects);
 
-/** Returns the sections that do not belong to a part. */
+/** Returns the panel's own sections, which no part of the viewer contributes. */
 function ownSections(state: ViewerState, facts: Facts, view: PanelView): readonly PartSection[] {
   const { isStereo } = facts;
   const about = aboutItems(facts);
@@ -205,7 +208,7 @@ function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
   ];
 }
 
-/** Shows how fine and how fast this device draws. */
+/** Returns the texts that report in which detail and at which frame rate this device draws. */
 function aboutItems(facts: Facts): readonly Control[] {
   const { settings, frame_ms, triangles, volumeLevel } = facts;
   const items: Control[] = [
@@ -250,12 +253,18 @@ function trianglesText(triangles: number): string {
   return `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`;
 }
 
-/** Each level has half as many voxels along an edge as the one before. */
+/**
+ * Returns the resolution of a mip level in words. Each level has half as many voxels along an edge
+ * as the one before.
+ */
 function volumesText(level: number): string {
   return level === 0 ? "in full detail" : `at 1/${2 ** level} detail`;
 }
 
-/** Names the shown forms, and whether they are complete. */
+/**
+ * Returns the status line: whether surfaces or volumes are shown, and whether they are loaded
+ * completely.
+ */
 function statusOf({ channels, mode, isolated, tiles }: ViewerState, facts: Facts): string {
   const { samples, isLoading } = facts;
   const isUnfinished = tiles.some((tile) => tile.isUnfinished);

@@ -10,7 +10,9 @@ function move(id: string, label: string, name: string, to: Command): Button {
   return { kind: "button", id, label, name, repeats: to, to: () => to };
 }
 
-/** Pairs of opposites; both buttons of a pair share a row. */
+/**
+ * Buttons that move the specimen. Two buttons in succession are opposite motions, and share a row.
+ */
 export const MOVES: readonly Button[] = [
   move("nearer", "Nearer", "Move the specimen closer", "zoom-in"),
   move("farther", "Farther", "Move the specimen farther away", "zoom-out"),

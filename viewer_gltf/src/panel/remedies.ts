@@ -14,7 +14,7 @@ export type RemedyContext = Readonly<{
   state: ViewerState;
   /** Bounds of the specimen or the isolated tile, um. */
   shown: Box;
-  /** Rows of the shown objects, by channel. */
+  /** By channel, the numbers of the shown objects' rows in the table of objects. */
   objects: ReadonlyMap<string, readonly number[]>;
 }>;
 

@@ -13,7 +13,10 @@ import { freeColours, nameOfColour } from "./palettes";
 /** The tile, channel and object that a ray from a tap meets. */
 export type Tapped = Readonly<{
   tile: string;
-  /** null: the place is inside a tile, but nothing is shown there. */
+  /**
+   * The channel of which something is shown at the tapped point; null: the point is inside a tile,
+   * but nothing is shown there.
+   */
   channel: string | null;
   /** An object of a label map: its row in the table, and its name. */
   object?: Readonly<{ row: number; name: string }>;
@@ -21,7 +24,10 @@ export type Tapped = Readonly<{
 
 export type TapCardContent = Readonly<{
   title: string;
-  /** Where the place is; "": nothing to add. */
+  /**
+   * Second line of the card: channel and tile of the tapped point, if the title does not name them;
+   * may be "".
+   */
   subtitle: string;
   controls: readonly Control[];
 }>;

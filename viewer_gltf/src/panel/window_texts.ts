@@ -3,7 +3,7 @@ import { valueText } from "../probe/measure";
 
 /** Voxel values of the source that are 0 and 255 in a volume, and their unit, if any. */
 export type Range = readonly [start: number, end: number, unit?: string];
-/** Ranges by channel. */
+/** By channel, the voxel values of the source that are 0 and 255 in a volume. */
 export type Ranges = ReadonlyMap<string, Range>;
 
 /** Returns a share of the intensities as a value of the source; in percent if the range is unknown. */

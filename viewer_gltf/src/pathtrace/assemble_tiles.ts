@@ -9,8 +9,8 @@ import type { Size3 } from "../bundle/ktx2";
 import { brickCounts } from "../voxels/skip_bricks";
 
 /**
- * One mip level of a tile, channels interleaved, x fastest. `at` is the place of the tile's finest level in the block's
- * finest level, and `whole` is its size there.
+ * One mip level of a tile, channels interleaved, x fastest. `at` is the first texel of the tile in
+ * the block, and `whole` is the tile's size, both in texels (x, y, z) of the finest mip level.
  */
 export type Part = Readonly<{ at: Size3; whole: Size3; size: Size3; texels: Uint8Array }>;
 
@@ -44,7 +44,10 @@ export function paste({ size, stride, texels }: Block, finest: Size3, part: Part
   }
 }
 
-/** Returns the block's texels along an axis that lie in a part, each with the nearest texel of the part. */
+/**
+ * Returns the block's texels along an axis that lie in a tile, each with the nearest texel of that
+ * tile.
+ */
 function axisOf(count: number, finest: number, { at, whole, size }: Part, k: number) {
   const pairs: [number, number][] = [];
   for (let i = 0; i < count; i++) {

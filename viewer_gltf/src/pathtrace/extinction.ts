@@ -10,7 +10,7 @@ import { envelopeOf, type TransferTable2d } from "../voxels/transfer_table_2d";
 /** Largest opacity, 0..1; an opacity of 1 would mean an infinite extinction. */
 const MAX_OPACITY = 0.999;
 
-/** The appearance of one channel: see `tile_march`. */
+/** The colour and the transfer function of one channel: see voxels/march_tables.ts. */
 export type MediumAppearance = Readonly<{
   color: readonly [number, number, number];
   table: Uint8Array;

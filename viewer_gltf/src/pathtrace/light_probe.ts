@@ -10,7 +10,10 @@ import { TRACE_PROBE } from "./shaders/sources";
 
 /** Number of pixels of the small frame, both eyes together. */
 const PIXELS = 600;
-/** Number of samples of each pixel after a change. */
+/**
+ * Number of samples of each pixel of the small frame that are taken at once after the light or the
+ * medium has changed.
+ */
 const FIRST_SAMPLES = 8;
 /** Factor to the earlier sums at each further sample, so that about FIRST_SAMPLES samples count. */
 const KEPT = 1 - 1 / FIRST_SAMPLES;

@@ -1,6 +1,6 @@
 /**
- * Loads the texels for path tracing: all tiles of up to four channels in one texture. A coarse level is loaded first,
- * and then the finest one that fits into the memory.
+ * Loads the texels for path tracing: all tiles of up to four channels in one texture. A coarse mip
+ * level is loaded first, and then the finest one that fits into the memory.
  */
 import type { Data3DTexture } from "three";
 import { decodeTexels } from "../bundle/decode";
@@ -19,7 +19,10 @@ export type MediumTexels = Readonly<{
   channels: readonly string[];
   frame: BlockFrame;
   level: number;
-  /** Size of the block in texels at this level; if bricks are streamed, at the finest level. */
+  /**
+   * Size of the block in texels (x, y, z) at the loaded mip level; if bricks are streamed, at the
+   * finest level.
+   */
   size: Size3;
   texture: Data3DTexture;
   /** Positions of the bricks in the texture; null: the texture is the whole block. */

@@ -32,7 +32,10 @@ export class PathSums {
   private sample = 0;
   /** Number of samples of a pixel since the frame began. Tiles that are sampled less often have fewer. */
   samples = 0;
-  /** Number of those samples whose paths belong to the current view. */
+  /**
+   * Number of samples of a pixel whose paths belong to the current view. The others come from an
+   * earlier view.
+   */
   rested = 0;
   /** Position among the tiles from which the next pass samples, 0..1. */
   private turn = 0;
@@ -48,7 +51,7 @@ export class PathSums {
     return this.sums[this.drawn % 2];
   }
 
-  /** Starts a frame of another view. */
+  /** Starts to sum up samples of another view. Earlier samples no longer count. */
   begin(): void {
     this.samples = this.rested = this.turn = 0;
   }

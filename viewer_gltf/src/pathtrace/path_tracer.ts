@@ -100,7 +100,10 @@ export class Tracer {
     return this.sums.samples;
   }
 
-  /** Number of those samples whose paths belong to the current view. */
+  /**
+   * Number of samples of a pixel whose paths belong to the current view. The others come from an
+   * earlier view.
+   */
   get rested(): number {
     return this.sums.rested;
   }
@@ -125,7 +128,7 @@ export class Tracer {
     this.begin();
   }
 
-  /** Starts a frame of another view. */
+  /** Starts to gather samples of another view. */
   private begin(): void {
     this.anchors = [];
     this.sums.begin();

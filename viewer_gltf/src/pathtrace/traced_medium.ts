@@ -14,7 +14,7 @@ import { frameOf } from "./texel_frame";
 export type MediumRequest = Readonly<{ channels: readonly string[]; tiles: readonly string[] }>;
 
 export type MediumHandlers = Readonly<{
-  /** Called when other texels have loaded. */
+  /** Called when new texels have loaded, which replace the previous ones. */
   onTexels: (texels: MediumTexels) => void;
   /** Called when bricks can't be used, so that the caller has to request everything again, now from files. */
   onRefused: () => void;

@@ -107,7 +107,10 @@ export function boxToWorld({ matrix, min }: BlockFrame): Matrix4 {
   return new Matrix4().fromArray([...matrix]).multiply(new Matrix4().makeTranslation(...min));
 }
 
-/** Sets the block of texels, its box, and the place of the box in the texels. */
+/**
+ * Sets the uniforms of the block of texels: its texture, its box in um, and where that box lies in
+ * the texture.
+ */
 export function texelsInto(uniforms: TraceUniforms, { frame, texture, index, size }: MediumTexels) {
   uniforms.uVolume.value = uniforms.uOldVolume.value = texture;
   uniforms.uIndex.value = index;

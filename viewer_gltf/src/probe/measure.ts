@@ -67,7 +67,10 @@ export function voxelAt(volume: TileVolume, point_um: Vec3): Vec3 | null {
   return centre === undefined ? null : [centre[0], centre[1], centre[2]];
 }
 
-/** Returns the place of a point (um, world) along the edges of a volume's box, 0 to 1; null outside. */
+/**
+ * Returns where a point (um, world) lies along the edges of a volume's box: shares 0 to 1 along x,
+ * y, z; null outside.
+ */
 function sharesIn({ bounds_um, matrix }: TileVolume, point_um: Vec3): number[] | null {
   const { min, max } = bounds_um;
   const toTile = new Matrix4().fromArray(matrix).invert();

@@ -96,7 +96,10 @@ export function probeSurfaces(
   return null;
 }
 
-/** Whether the ray leaves the solid here. */
+/**
+ * Returns whether a ray leaves a solid at an intersection, which is then on the inside of its
+ * surface.
+ */
 function isInside({ face, object }: Intersection<Mesh>, direction: Vector3): boolean {
   if (!face) return false;
   const normal = face.normal.clone().transformDirection(object.matrixWorld);

@@ -24,7 +24,7 @@ import {
 } from "./probe";
 import { availableLevel, TexelCache } from "./texel_cache";
 
-/** Largest number of texels of the level in which the reader looks for a ray's hit. */
+/** Largest number of texels of the mip level in which the reader looks for a ray's hit. */
 const PROBED_TEXELS = 2 * 1024 * 1024;
 
 export type ReadingOptions = Readonly<{
@@ -113,7 +113,10 @@ export class Reading {
     return values.ask(volume.tile, channel, voxel).catch(() => null);
   }
 
-  /** Returns a key of the levels from which values are read; values at the points change only if the key changes. */
+  /**
+   * Returns a key of the mip levels from which values are read. The values at the points change
+   * only if the key changes.
+   */
   sourcesKey(points: readonly Vec3[]): string {
     const known = points.flatMap((point) => {
       const tile = this.tileAt(point);

@@ -1,6 +1,6 @@
 /**
- * Provides texels of the volumes to the CPU. Texels on the GPU can't be read back, so an available level is decompressed
- * again in the worker. The most recently used levels stay in memory.
+ * Provides texels of the volumes to the CPU. Texels on the GPU can't be read back, so an available
+ * mip level is decompressed again in the worker. The most recently used levels stay in memory.
  */
 
 import { decodeTexels } from "../bundle/decode";
@@ -11,7 +11,7 @@ import type { VolumeLevel } from "./measure";
 
 /** Largest size of the cache, bytes; the level that was requested last is kept even if it is larger. */
 const KEPT_BYTES = 64 * 1024 * 1024;
-/** Largest number of texels of a level that is fetched if none is available. */
+/** Largest number of texels of the mip level that is fetched if no level is available. */
 const FETCHED_TEXELS = 4 * 1024 * 1024;
 
 type Kept = Readonly<{ bytes: number; level: Promise<VolumeLevel> }>;

@@ -77,7 +77,8 @@ export class Backdrop {
 
   /**
    * Fits ground and shadow to the specimen.
-   * @param points outermost points of the shown part, in the scene, metres; empty: no shadow
+   * @param points outermost points of what is shown of the specimen, in metres of the scene; empty:
+   * no shadow
    */
   fitTo(points: readonly Vec3[]): void {
     this.isEmpty = points.length === 0;

@@ -62,14 +62,14 @@ export function makeSurfaceFrame(
 export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean; isSolid: boolean }>;
 
 /**
- * GLSL chunks by which a part extends the surface shaders; see insertions/surface.vert.glsl and
- * surface.frag.glsl.
+ * GLSL chunks by which a part of the viewer extends the surface shaders; see
+ * insertions/surface.vert.glsl and surface.frag.glsl.
  */
 type PartChunk =
   | `part/vertex_${"declared" | "place" | "end"}`
   | `part/fragment_${"declared" | "color"}`;
 
-/** Shader code and uniforms that a part adds to some surfaces. */
+/** Shader code and uniforms that a part of the viewer adds to some surfaces. */
 export type SurfacePart = Readonly<{
   /** Cache key of the shader text: equal texts have equal keys. */
   key: string;
@@ -198,7 +198,8 @@ export class BlendedSurface {
       if (object instanceof Mesh) meshes.push(object);
     });
     this.meshes = meshes;
-    this.depth.transparent = true; // drawn in one order with the colours
+    // makes three.js sort the depth pass together with the surfaces' colours
+    this.depth.transparent = true;
     this.depthMeshes = meshes.map((mesh) => {
       const depthMesh = new Mesh(mesh.geometry, this.depth);
       depthMesh.renderOrder = -DEPTH_AHEAD;
@@ -226,7 +227,7 @@ export class BlendedSurface {
     Object.assign(depth.uniforms, part.uniforms);
     depth.vertexShader = includeChunks(depthVertex, { ...CHUNKS, ...part.chunks });
     for (const material of [...this.materials, depth]) material.needsUpdate = true;
-    // the depth pass discards the same fragments
+    // the pass that writes depth must not replace these materials, because they discard fragments
     for (const material of this.materials) material.allowOverride = false;
   }
 

@@ -49,7 +49,7 @@ export interface MarchedVolumes {
   /** Bytes on the GPU. */
   readonly bytes: number;
   aim(view: MarchView): void;
-  /** Whether all wanted volumes of a tile are loaded, at some level. */
+  /** Whether all wanted volumes of a tile are loaded, at any mip level. */
   isReady(tile: string): boolean;
   shown(): readonly ShownVolume[];
   status(): readonly VolumeStatus[];
@@ -69,16 +69,19 @@ export type TraceScene = Readonly<{
 /** A ray-marched frame of the same view, linear and premultiplied. */
 export type MarchedFrame = Readonly<{
   image: Texture;
-  /** Its pixels per pixel of the frame buffer. */
+  /** Pixels of the marched frame for each pixel of the frame buffer, along an edge. */
   scale: number;
 }>;
 
 /** How much work the path tracing of a frame may take. */
 export type TracePace = Readonly<{
-  /** Share of the pixels that the frame's budget allows, 0 to 1. */
+  /** Pixels that the time budget allows for each pixel of the frame, along an edge, 0 to 1. */
   resolution: number;
   isMoving: boolean;
-  /** Samples per pixel. */
+  /**
+   * Path-traced samples that are added to each pixel; below 1, the share of the pixels that get
+   * one.
+   */
   passes: number;
   /** The ray march of the same view, shown until path tracing has an image; null: none. */
   standIn: MarchedFrame | null;

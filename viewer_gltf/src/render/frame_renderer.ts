@@ -30,9 +30,9 @@ import { MarchPass } from "./raymarch_pass";
 import type { SpecimenScene } from "./specimen_scene";
 
 export type Drawn = Readonly<{
-  /** Null if no part draws volumes. */
+  /** The marched volumes; null if no part of the viewer draws volumes. */
   volumes: MarchedVolumes | null;
-  /** Null if no part traces paths. */
+  /** The path-traced volumes; null if no part of the viewer traces paths. */
   traced: TracedVolumes | null;
   panes: readonly BlendedScene[];
   /** Other objects that are not opaque, besides those of the scene itself. */
@@ -47,10 +47,10 @@ export type Drawn = Readonly<{
 
 /** The quality of one frame. */
 export type FramePace = Readonly<{
-  /** Pixels of the volumes per pixel of the frame, 0 to 1. */
+  /** Pixels of the marched image for each pixel of the frame, along an edge, 0 to 1. */
   resolution: number;
   isMoving: boolean;
-  /** Traced samples per pixel. */
+  /** Path-traced samples that are added to each pixel in this frame. */
   passes: number;
   /**
    * Whether edges are anti-aliased, which takes a third of a frame of surfaces on a software
@@ -94,7 +94,7 @@ export class FrameRenderer {
   };
   /** Target of the whole frame in linear light, before it is encoded. */
   private readonly light: WebGLRenderTarget;
-  /** Target without anti-aliasing. */
+  /** Target of a frame in linear light without anti-aliasing, for moving views that are late. */
   private readonly draft: WebGLRenderTarget;
   private readonly encode = new EncodePass();
   /** Fades from the frame before a jump to the frame after it. */

@@ -17,7 +17,7 @@ import type { ViewerState } from "../state/viewer_state";
 const OPENING_S = 0.4;
 /** Share of the outer radius within which no surface is drawn. */
 const INNER = 0.6;
-/** Seconds that the gaze must stay on the same tiles before finer levels are fetched. */
+/** Seconds that the gaze must stay on the same tiles before finer mip levels are fetched. */
 const REFINE_S = 0.25;
 
 /** Radians. Largest half angle of a cone that is marched. */
@@ -55,7 +55,7 @@ export class GazeFocus {
     return [Math.cos(INNER * this.outer_rad), Math.cos(this.outer_rad)];
   }
 
-  /** Cosine of the outer radius plus `more_rad`; 1 if the disc is closed. */
+  /** Returns the cosine of the disc's outer radius plus `more_rad`; 1 if the disc is closed. */
   reach(more_rad: number): number {
     return this.outer_rad === 0 ? 1 : Math.cos(Math.min(WIDEST_RAD, this.outer_rad + more_rad));
   }
@@ -84,7 +84,8 @@ export class GazeFocus {
       tiles: shownTiles(this.manifest.tiles, state.isolated),
       clip: state.clip,
       switchDistance_um: state.switchDistance_m / specimen.getMaxScaleOnAxis(),
-      // The set radius is used, so that tiles do not come and go with the frame's budget.
+      // The radius that the user has set is used here. With the smaller radius of a late frame,
+      // tiles would come and go.
       discRadius_rad: set_rad,
       dt_s,
     });

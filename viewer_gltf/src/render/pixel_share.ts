@@ -13,7 +13,7 @@ export function pixelShare(): number {
   return share >= LEAST && share <= 1 ? share : 1;
 }
 
-/** Halves the share for the next time that the page opens. */
+/** Halves the share of the pixels, from the next time on that the page opens. */
 export function halvePixelShare(): void {
   store(KEY, String(Math.max(LEAST, pixelShare() / 2)), "in-tab");
 }

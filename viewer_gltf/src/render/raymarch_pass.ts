@@ -58,7 +58,8 @@ export class MarchPass {
   }
 
   /**
-   * Marches the volumes in `scene`, with `scale` pixels per pixel of the frame, 0 to 1.
+   * Marches the volumes in `scene`, with `scale` pixels for each pixel of the frame along an edge,
+   * 0 to 1.
    *
    * @param gathers whether the view is the same as in the last image, so that both are averaged
    */

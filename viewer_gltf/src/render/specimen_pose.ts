@@ -14,7 +14,7 @@ export const MOVE_S = 0.4;
 const FARTHEST_M = 5;
 
 export class Specimen {
-  /** Its children are in um, world. */
+  /** The specimen in the scene; the coordinates of its children are in um of the world. */
   readonly group = new Group();
   pose: SpecimenPose;
   isMoved = false;
@@ -24,7 +24,7 @@ export class Specimen {
   private way = 1;
   /** Where the middle of the shown part is in the scene until somebody moves it. */
   readonly anchor = new Vector3();
-  /** Factor of its initial size. */
+  /** Present size of the specimen, as a factor of its initial size. */
   size = 1;
   /** Whether moves are jumps, as in stereo, where gliding causes sickness. The frame then fades. */
   isJumping = false;
@@ -84,7 +84,7 @@ export class Specimen {
     this.way = 0;
   }
 
-  /** The pose that it has until somebody moves it. */
+  /** The pose of the specimen until a user moves it. */
   get home(): SpecimenPose {
     const orientation = this.facing.clone();
     const { focus, size } = this;
@@ -105,13 +105,13 @@ export class Specimen {
     this.settle(this.home);
   }
 
-  /** Moves it to another pose at once, as a jump. */
+  /** Moves the specimen to another pose at once, as a jump. */
   jumpTo(pose: SpecimenPose, viewer: Vector3): void {
     this.hasJumped = true;
     this.moveTo(pose, viewer);
   }
 
-  /** Whether it has jumped since the last call. */
+  /** Returns whether the specimen has jumped since the last call of this method. */
   takeJump(): boolean {
     const { hasJumped } = this;
     this.hasJumped = false;
@@ -119,7 +119,7 @@ export class Specimen {
   }
 
   /**
-   * Moves it by hand.
+   * Moves the specimen as a hand demands.
    * @param viewer position of the eyes in the scene
    */
   moveTo(pose: SpecimenPose, viewer: Vector3): void {
@@ -128,7 +128,7 @@ export class Specimen {
     this.isMoved = true;
   }
 
-  /** Advances a move. Returns whether it is still going on. */
+  /** Advances a gradual move of the specimen. Returns whether the move is still going on. */
   advance(dt_s: number): boolean {
     if (this.way === 1) return false;
     this.way = Math.min(1, this.way + dt_s / MOVE_S);

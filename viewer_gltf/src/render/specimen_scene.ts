@@ -33,7 +33,7 @@ export class SpecimenScene {
   private readonly flat = new Color(FAR.dark);
   private isUsers = false;
   private backdrop: Backdrop | null = null;
-  /** Outermost points of the shown part, in the scene, metres. */
+  /** Outermost points of what is shown of the specimen, in metres of the scene. */
   private outermost: readonly Vec3[] = [];
 
   constructor(private readonly manifest: Manifest) {
@@ -79,7 +79,7 @@ export class SpecimenScene {
 
   /**
    * Fits the backdrop to the specimen.
-   * @param points outermost points of the shown part, in the scene, metres
+   * @param points outermost points of what is shown of the specimen, in metres of the scene
    */
   fitBackdrop(points: readonly Vec3[]): void {
     this.outermost = points;

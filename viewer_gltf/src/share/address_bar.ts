@@ -97,7 +97,7 @@ export class AddressBar {
     return { state, camera: isHome ? null : camera };
   }
 
-  /** The state in which the page opens with the part of its address before the `#`. */
+  /** The state in which the page opens if its address has no link after the `#`. */
   private get start(): ViewerState {
     const start = initialState(this.host.bundle.manifest);
     return settingsOf(location.search).reduce(reduce, start);

@@ -20,7 +20,10 @@ class SharePart implements Part, Links {
   private code: LinkWriter | null = null;
   /** The view that the address has opened; null until it is open. */
   private opened: Opened | null = null;
-  /** null if the address does not follow the view. */
+  /**
+   * Keeps the page's address equal to a link to the view; null if the address does not follow the
+   * view.
+   */
   private addressBar: AddressBar | null = null;
 
   constructor(private readonly host: PartHost) {}
@@ -67,7 +70,7 @@ class SharePart implements Part, Links {
     const address = new URL(pageAddress());
     for (const name of settingNames()) address.searchParams.delete(name);
     address.hash = linkOf(host, initialState(host.bundle.manifest));
-    // In the split screen the address stays; it follows the view again afterwards.
+    // In the split screen the address is not changed. Afterwards it follows the view again.
     if (hasAddress() && !isPassingStep()) writeAddress(address);
     host.panel.show({ link: address.href });
     host.panel.unfold("share");

@@ -78,7 +78,10 @@ function texelMatrix(volume: TileVolume, { size }: VolumeLevel): TexelSpace {
 /** Tolerance at a tile's edge, texels. Neighbours share the edge, and rounding must not leave a gap between them. */
 const RIM = 1e-3;
 
-/** Samples one row of pixels trilinearly, from the texel position `at` on in steps of `step`. */
+/**
+ * Samples one row of an image trilinearly. The first pixel is at the texel position `at`, and each
+ * next one is farther by the vector `step`.
+ */
 function sampleRow(
   values: Float32Array,
   offset: number,

@@ -8,7 +8,10 @@ import { negated, type SliceFrame } from "./slice_frame";
  * cuts the slices themselves.
  */
 const BEFORE = 1e-5;
-/** Distance from a slice, as a share of the same edge, within which a passing eye does not switch corners yet. */
+/**
+ * Distance from a slice, as a share of half the image's longer edge, within which a passing eye
+ * does not switch corners yet.
+ */
 const SWITCH_DISTANCE = 0.02;
 
 /**

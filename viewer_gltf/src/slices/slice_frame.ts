@@ -16,7 +16,7 @@ export type SliceFrame = Readonly<{
   name: string;
   /** The point of the plane at the centre of the image. */
   origin: Vec3;
-  /** Unit vectors; the eye looks against the normal. */
+  /** Unit vectors that lead right and up in the image, and from the plane to the eye (`normal`). */
   right: Vec3;
   up: Vec3;
   normal: Vec3;

@@ -48,7 +48,10 @@ export class SliceImages {
   /** Box of the specimen, or of the isolated tile, um. */
   box: Box;
   readonly canvases = AXES.map(() => document.createElement("canvas"));
-  /** Number of times that the images have been drawn. */
+  /**
+   * Number of times that the images have been drawn. Owners of copies compare it to notice new
+   * content.
+   */
   version = 0;
   isLoading = false;
   /** Whether texels have loaded; until then the images are black. */

@@ -99,7 +99,7 @@ class Planes {
       context.drawImage(slice, left + BORDER_PX, BORDER_PX);
       left += width + 2 * BORDER_PX;
     }
-    this.texture.dispose(); // its size on the GPU is fixed
+    this.texture.dispose(); // a texture on the GPU cannot change its size
     this.texture.needsUpdate = true;
   }
 

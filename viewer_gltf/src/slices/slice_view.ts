@@ -16,7 +16,9 @@ export type SliceChanges = Readonly<{
   window: (wider: number, higher: number) => void;
 }>;
 
-/** Movement for each press of a key or notch of the wheel: a share of the image's edge, or an angle. */
+/**
+ * Movement of the crosshair or the slice for each press of a key, as a share of the image's edge.
+ */
 const KEY_STEP = 0.01;
 const KEY_TURN_DEG = 5;
 const WHEEL_STEP = 0.01;

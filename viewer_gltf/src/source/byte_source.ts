@@ -44,7 +44,10 @@ export class LocalFile implements ByteSource {
   }
 }
 
-/** First byte and number of bytes of a range of a file. */
+/**
+ * Returns the offset of the first byte, and the number of bytes, that a range covers in a file of
+ * `size` bytes.
+ */
 export function placeOf(
   range: ByteRange,
   size: number,

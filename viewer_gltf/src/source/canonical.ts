@@ -15,7 +15,7 @@ export type Canonical = Readonly<{
   order: readonly [0 | 1 | 2, 0 | 1 | 2, 0 | 1 | 2];
   /** Whether z, y, x run backwards along the stored axis. */
   flips: readonly [boolean, boolean, boolean];
-  /** z, y, x. */
+  /** Distance between voxels along z, y and x, um. */
   spacing_um: Triple;
   /** 4 x 4, column-major, um: from the world of the voxels, whose origin is the first one, to the patient's. */
   placement: readonly number[];

@@ -7,12 +7,15 @@
  */
 import { SourceError } from "./source_error";
 
-/** Along z, y and x. */
+/** Three numbers of a volume: along z, y and x. */
 export type Triple = readonly [number, number, number];
 
 /** Largest number of shown voxels of all channels together; 8 MB of textures. */
 export const SHOWN_VOXELS = 8_000_000;
-/** Largest number of voxels that are read for each shown voxel, at the coarsest (or only) level of a source. */
+/**
+ * Largest number of voxels that are read for each shown voxel, at the coarsest (or only) resolution
+ * level of a source.
+ */
 export const READ_FACTOR = 8;
 /** Approximate number of values on which a window is found. The pipeline takes 6 million. */
 const SAMPLED_VOXELS = 500_000;
@@ -30,7 +33,7 @@ export type StoredVoxels = Readonly<{
 }>;
 
 export type CoarseVolume = Readonly<{
-  /** Values, x fastest. */
+  /** Values of the averaged voxels, x fastest. */
   voxels: Float32Array<ArrayBuffer>;
   shape: Triple;
   /** Centre of voxel (0, 0, 0), in voxels of the finest level. */
@@ -41,7 +44,10 @@ export type CoarseVolume = Readonly<{
   sample: Float32Array<ArrayBuffer>;
 }>;
 
-/** The place of a level: centre of its first voxel and distance of its voxels, both in voxels of the finest level. */
+/**
+ * Where the voxels of a resolution level lie: the centre of its first voxel and the distance
+ * between voxels (z, y, x), both in voxels of the finest level.
+ */
 export type LevelPlace = Readonly<{ first: Triple; step: Triple }>;
 
 export const volumeOf = ([z, y, x]: Triple) => z * y * x;
@@ -126,12 +132,13 @@ function leastOf(values: Float32Array): number | null {
   return Number.isFinite(least) ? least : null;
 }
 
-/** Places of a texture's samples along an axis, in voxels of the finest level. */
+/** Positions of a texture's samples along one axis, in voxels of the finest resolution level. */
 export type Places = Readonly<{ first: number; apart: number; count: number }>;
 
 /**
- * Returns places about `step` apart, from the first voxel of the finest level to the last one, and `apron` more beyond
- * each end. The volume's box is thus the same as that of a build, whichever level is shown.
+ * Returns positions about `step` apart, from the first voxel of the finest resolution level to the
+ * last one, and `apron` more beyond each end. The volume's box is thus the same as that of a build,
+ * whichever level is shown.
  */
 export function placesAlong(voxels: number, step: number, apron: number): Places {
   const last = voxels - 1;
@@ -140,7 +147,10 @@ export function placesAlong(voxels: number, step: number, apron: number): Places
   return { first: -apron * apart, apart, count: count + 2 * apron };
 }
 
-/** The voxels at a grid of places, by linear interpolation. Beyond the outermost voxels their values continue. */
+/**
+ * Returns the values at a grid of positions, by linear interpolation. Beyond the outermost voxels
+ * their values continue.
+ */
 export function resample(
   volume: CoarseVolume,
   places: readonly [Places, Places, Places],

@@ -20,7 +20,7 @@ import type { OpacityPoints } from "./opacity";
 export const GREY = "grey";
 
 /**
- * @param level at which the specimen begins, 0..1 in the window
+ * @param level intensity at which the specimen begins, as a share 0..1 of the window
  * @param opacity of the general function
  * @param gradientMax size of a step whose gradient counts as 1, as a share of the window
  */

@@ -27,7 +27,7 @@ const APRON = 1;
 const TILE = "r0_c0";
 /** The gradient magnitude of the last row of a histogram: the default of `TransferFunctions2d`. */
 const GRADIENT_MAX = 0.5;
-/** The level of the skin, Hounsfield units: presets/ct.toml. */
+/** Value at which the skin begins, Hounsfield units: presets/ct.toml. */
 const SKIN_HU = -300;
 /** Directions of a patient's sides; the same as `PATIENT_SIDES` of usd/opening.py. */
 const SIDES = { left: [1, 0, 0], posterior: [0, 0, -1], superior: [0, 1, 0] } as const;

@@ -13,7 +13,7 @@ import { SourceError } from "./source_error";
 
 const SPATIAL = ["z", "y", "x"] as const;
 
-/** One level of the pyramid. */
+/** One resolution level of the pyramid. */
 export type NgffLevel = Readonly<{
   path: string;
   /** Distance between voxels (z, y, x), um, and centre of the first one; null if not stated. */
@@ -32,7 +32,7 @@ export type NgffChannel = Readonly<{
 export type NgffImage = Readonly<{
   /** Names of the axes, slowest first, in lower case: t, c, z, y, x in any order. */
   axes: readonly string[];
-  /** Finest first. */
+  /** Resolution levels of the pyramid, finest first. */
   levels: readonly NgffLevel[];
   /** The channels that the metadata describe; the image may have more. */
   channels: readonly NgffChannel[];

@@ -43,10 +43,10 @@ export type NiftiHeader = Readonly<{
   type: VoxelType;
   bytesPerVoxel: number;
   isLittleEndian: boolean;
-  /** Along x, y and z: x is stored fastest. */
+  /** Number of voxels along x, y and z; x is stored fastest. */
   shape: Triple;
   times: number;
-  /** Bytes before the first voxel. */
+  /** Number of bytes of the unpacked file before the first voxel. */
   offset: number;
   slope: number;
   intercept: number;

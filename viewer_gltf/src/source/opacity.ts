@@ -1,10 +1,11 @@
 /**
  * Makes transfer functions from intensity to opacity.
  *
- * Follows `make_transfer_functions` of pipeline/stereocell/transfer/opacity.py, which explains the method and defines
- * the numbers. The level differs: a build uses the level of a surface, and this page uses the level of find_level.ts,
- * or the level of the skin for a CT. The page makes no functions at the adaptive threshold or for the tissues of a CT,
- * and no two-dimensional ones except those of grey_shapes.ts.
+ * Follows `make_transfer_functions` of pipeline/stereocell/transfer/opacity.py, which explains the
+ * method and defines the numbers. The level (the intensity at which the specimen begins) differs: a
+ * build uses the iso-value of a surface. This page uses the intensity of find_level.ts, or that of
+ * the skin for a CT. The page makes no functions at the adaptive threshold or for the tissues of a
+ * CT, and no two-dimensional ones except those of grey_shapes.ts.
  */
 import {
   AT_SURFACE,
@@ -27,11 +28,14 @@ import { BINS } from "./find_window";
 /** Intensity and opacity, 0..1 each. */
 export type OpacityPoints = readonly (readonly [number, number])[];
 
-/** Percent of the voxels that are too faint to show in a channel without a level. */
+/**
+ * Percent of the voxels that are too faint to show in a channel in which no intensity is known at
+ * which objects begin.
+ */
 const LEVEL_PERCENTILE = 99;
 
 export type FunctionOptions = Readonly<{
-  /** Level at which the specimen begins, 0..1 in the window; null if unknown. */
+  /** Intensity at which the specimen begins, as a share 0..1 of the window; null if unknown. */
   level: number | null;
   /** The DICOM modality; empty for a microscope. */
   modality: "" | "CT" | "MR";

@@ -18,12 +18,12 @@ export type ImageChannel = Readonly<{
 /** An opened source: its metadata, and the functions that read its voxels. */
 export type OpenedImage = Readonly<{
   name: string;
-  /** Voxels of the finest level (z, y, x), and their distance in um. */
+  /** Number of voxels of the finest resolution level (z, y, x), and their distance in um. */
   shape: Triple;
   spacing_um: Triple;
   /** 4 x 4, column-major, um: from the world of the voxels, whose origin is the first one, to the world. */
   placement: readonly number[];
-  /** Whether the sides of a patient are known. */
+  /** Whether the directions to a patient's left, posterior and superior side are known. */
   hasSides: boolean;
   /** Whether stored values may be below 0. */
   isSigned: boolean;

@@ -86,7 +86,7 @@ export async function openZarr(
   };
 }
 
-/** The finest level and the one that is shown, along z, y and x. */
+/** The finest resolution level of the image and the one that is shown, along z, y and x. */
 type Grid = Readonly<{
   shape: Triple;
   spacing_um: Triple;

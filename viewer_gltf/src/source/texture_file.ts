@@ -42,13 +42,13 @@ export function storeZstd(data: Uint8Array): Uint8Array<ArrayBuffer> {
 
 export type Texture = Readonly<{
   file: Uint8Array<ArrayBuffer>;
-  /** The place of each level's frame in the file, finest first. */
+  /** Offset and length, bytes, of each mip level's zstd frame in the file, finest first. */
   levels: readonly Readonly<{ offset: number; length: number }>[];
 }>;
 
 /**
  * @param size   texels x, y, z
- * @param levels texels of each level, finest first; `channels` bytes a texel
+ * @param levels texels of each mip level, finest first; `channels` bytes a texel
  */
 export function writeKtx2(
   size: readonly [number, number, number],

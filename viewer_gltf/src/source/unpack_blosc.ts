@@ -15,7 +15,7 @@ const HEADER_BYTES = 16;
 const [SHUFFLED, COPIED, BIT_SHUFFLED, UNSPLIT] = [1, 2, 4, 16];
 /** Blocks have a stream for each byte of a value if values have at most 16 bytes, and blocks at least 128 values. */
 const [MAX_SPLITS, MIN_SPLIT] = [16, 128];
-/** Largest chunk that is unpacked. */
+/** Largest size of a chunk after it is unpacked, bytes. */
 const MAX_BYTES = 1 << 30;
 
 const zstd = new ZSTDDecoder();

@@ -26,7 +26,10 @@ export function toTexels(values: Float32Array, [low, high]: readonly [number, nu
   return texels;
 }
 
-/** Returns the volume and its coarser levels, finest first. Each level is made from unrounded means, then rounded. */
+/**
+ * Returns the volume and its coarser mip levels, finest first. Each level is made from unrounded
+ * means, then rounded.
+ */
 export function mipLevels(volume: Texels): readonly Texels[] {
   const levels = [volume];
   let means = new Float32Array(volume.data);

@@ -42,7 +42,10 @@ function usefulWindow(window: NgffChannel["window"], dtype: string): NgffChannel
 /** Longest name of a channel, characters. */
 const LONGEST_NAME = 60;
 
-/** Makes names unique: equal names get the number of their place, as in a build. */
+/**
+ * Makes names unique: a name that occurs more than once gets the channel's index, counted from 0,
+ * as in a build.
+ */
 function unique(stated: readonly string[]): readonly string[] {
   const names = stated.map((name) => name.slice(0, LONGEST_NAME));
   const counts = new Map<string, number>();

@@ -1,4 +1,4 @@
-/** Chooses the level of an OME-Zarr image to show, and finds where its voxels lie. */
+/** Chooses the resolution level of an OME-Zarr image to show, and finds where its voxels lie. */
 import * as zarr from "zarrita";
 import { type LevelPlace, READ_FACTOR, type Triple, triple, volumeOf } from "./coarse_volume";
 import type { NgffImage } from "./ngff";
@@ -45,8 +45,9 @@ export async function openLevel(
 }
 
 /**
- * Returns the finest level that is small enough; if none is, the coarsest, which is then reduced to means of blocks.
- * Throws SourceError if the coarsest has more than READ_FACTOR times as many voxels.
+ * Returns the finest resolution level that is small enough; if none is, the coarsest, which is then
+ * reduced to means of blocks. Throws SourceError if the coarsest has more than READ_FACTOR times as
+ * many voxels.
  *
  * @param most largest number of voxels of a channel
  */

@@ -24,14 +24,14 @@ const WIDE = 0xffffffff;
 const MAX_LIST_BYTES = 1 << 27;
 /** Largest member that is unpacked, bytes. */
 const MAX_UNPACKED_BYTES = 1 << 29;
-/** Methods: stored, deflate. */
+/** Numbers of the compression methods of members: stored (not compressed), and deflate. */
 const [STORED, DEFLATED] = [0, 8];
 
 type Member = Readonly<{
   method: number;
   packed: number;
   unpacked: number;
-  /** First byte of the local header. */
+  /** Offset of the member's local header in the archive, bytes. */
   header: number;
   /** Estimated size of the local header, bytes; its extra fields may differ from those in the list. */
   headerBytes: number;

@@ -26,7 +26,8 @@ export type Action =
   | Readonly<{ type: "window"; channel: string; window: readonly [number, number] }>
   | Readonly<{ type: "choose-transfer-function"; channel: string; name: string }>
   /**
-   * Gives a transfer function other shapes and chooses it. The name `own` may be a new function.
+   * Replaces the shapes of a transfer function and makes that function the chosen one. If the name
+   * is `own`, the function may not exist yet.
    */
   | Readonly<{ type: "set-shapes"; channel: string; name: string; shapes: Shapes }>
   /** The bundle's two-dimensional transfer functions of a channel have been fetched. */

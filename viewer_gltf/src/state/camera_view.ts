@@ -3,7 +3,7 @@ import type { Vec3 } from "../math/vec3";
 
 /**
  * The specimen's centre, its rotation (quaternion x, y, z, w) and its size, as a multiple of the
- * usual one.
+ * size at the opening.
  */
 export type SpecimenPlacement = Readonly<{
   position: Vec3;
@@ -15,6 +15,6 @@ export type CameraView = Readonly<{
   /** Place of the camera, and the point that it turns around. */
   position: Vec3;
   target: Vec3;
-  /** null: the specimen's opening pose. */
+  /** Pose of the specimen in the scene; null: the opening pose. */
   specimen: SpecimenPlacement | null;
 }>;

@@ -5,7 +5,7 @@
 export const OWN_COMMANDS = [
   /** Shows the whole specimen from the front, with no tile isolated. */
   "reset",
-  /** Goes one step back: from an isolated tile to all tiles, or from a selected tile to none. */
+  /** Shows all tiles again if one is isolated; otherwise deselects the selected tile. */
   "back",
   /** Goes one step back or forward in the history. */
   "undo",

@@ -28,11 +28,11 @@ export type GazeInput = Readonly<{
   gaze: Ray;
   /** Tiles that the gaze can meet. */
   tiles: readonly BoxedTile[];
-  /** Part of the tiles that the cuts leave. */
+  /** Cuts that remove part of the tiles. The gaze does not stop at what they remove. */
   clip: Clip;
   switchDistance_um: number;
   discRadius_rad: number;
-  /** Time since the previous frame. */
+  /** Time since the previous frame, s. */
   dt_s: number;
 }>;
 
@@ -132,8 +132,8 @@ function discTiles(
 }
 
 /**
- * Returns the largest radius at which the disc ends before the first tile whose volume is not
- * loaded. A larger disc would show the edge of that tile's box.
+ * Returns the largest radius of the focus disc, in radians, that contains no tile whose volume is
+ * not loaded. A larger disc would show the edge of that tile's box.
  */
 export function discReach(
   { rayTiles }: FocusState,
@@ -146,7 +146,8 @@ export function discReach(
 }
 
 /**
- * Returns the radius at which MAX_DISC_TILES ends the disc; null if the disc covers fewer tiles.
+ * Returns the largest radius of the focus disc that MAX_DISC_TILES allows; null if the whole disc
+ * covers no more tiles.
  */
 export function discLimit(
   { rayTiles, near, disc }: FocusState,

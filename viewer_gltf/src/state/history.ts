@@ -1,6 +1,6 @@
 /**
- * Undo and redo. The history holds the moments before each step of the user: the state and all that
- * belongs to it. Pure.
+ * Undo and redo. For each step of the user, the history holds the moment before it: the state, and
+ * for example the camera. Pure.
  *
  * Changes of the same kind in quick succession, for example by dragging a slider, are one step.
  * Notices, loaded data and the abilities of the device are not steps of the user, so undo leaves
@@ -27,9 +27,12 @@ export const PAUSE_S = 1;
  * join its step.
  */
 export type Occasion = Readonly<{
-  /** null: the change is a step of its own. */
+  /** Key of changes that may be joined to one step; null: the change is a separate step. */
   key: string | null;
-  /** Number of presses and releases so far. */
+  /**
+   * Number of times that the user has pressed or released a key or a button so far. Changes with an
+   * equal number belong to one gesture.
+   */
   gesture: number;
   isHeld: boolean;
   time_s: number;
@@ -38,7 +41,7 @@ export type Occasion = Readonly<{
 type Step<T> = Readonly<{ before: T; name: string }>;
 export type History<T> = Readonly<{
   past: readonly Step<T>[];
-  /** `before` is the moment that redo leads to. */
+  /** Undone steps. Here, `before` is the moment to which redo leads, after the step. */
   future: readonly Step<T>[];
   last: Occasion | null;
 }>;

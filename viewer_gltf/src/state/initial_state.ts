@@ -50,7 +50,9 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
       id: channel.id,
       name: channel.name,
       shown: shown.has(channel.id),
-      turn: index - manifest.channels.length, // negative: hidden before any channel that the user shows
+      // negative: if too many channels are shown, these are hidden before any that the user has
+      // shown
+      turn: index - manifest.channels.length,
       ...START_CHANNEL,
       color: channel.color,
       original: channel.color,

@@ -72,7 +72,10 @@ export function freeName(kind: MeasureKind, others: readonly Measurement[]): str
   for (let i = 1; ; i++) if (!taken.has(`${NAMES[kind]} ${i}`)) return `${NAMES[kind]} ${i}`;
 }
 
-/** Returns the list within the limits, without measurements that lack points. */
+/**
+ * Returns the list without measurements that lack points, shortened to the largest number of
+ * measurements and of points.
+ */
 export function withinLimits(list: readonly Measurement[]): readonly Measurement[] {
   return list
     .filter(({ kind, points }) => missing(kind, points) === 0)

@@ -1,7 +1,7 @@
 /** Groups notices for display: notices of many files with the same fault are shown as one. Pure. */
 
 export type NoticeGroup = Readonly<{
-  /** Text that is shown. */
+  /** The text that the page shows for the group. */
   text: string;
   /** Notices in the group, which are dismissed together. */
   of: readonly string[];
@@ -9,7 +9,7 @@ export type NoticeGroup = Readonly<{
 
 /** Matches `volumes/r0_c0/CD8.ktx2: the host answered with status 404`; the fault may have several lines. */
 const FILE_NOTICE = /^(\S+\.\w{2,11}): (.+)$/s;
-/** Parts of a notice that differ from file to file: sizes, hashes, levels. */
+/** Parts of a notice that differ from file to file: sizes, hashes, numbers of mip levels. */
 const VARYING_PARTS = /\b[0-9a-f]{8,}\b|\d+/g;
 
 function faultOf(notice: string): string | null {

@@ -14,7 +14,7 @@ export type ObjectView = Readonly<{
   /** ID of the column that colours the objects; "": none; null: the table's own choice. */
   colorBy: string | null;
   palette: PaletteName;
-  /** Bytes at which the palette begins and ends. */
+  /** Bytes (0..255) of the colouring column at which the palette begins and ends. */
   span: readonly [number, number];
   /**
    * Whether the palette is spread over the logarithm of the values; null: as in the
@@ -29,7 +29,10 @@ export type ObjectView = Readonly<{
   /** Indices of categories that are hidden, by column; -1: objects without a category. */
   without: Readonly<Record<string, readonly number[]>>;
   hidden: readonly number[];
-  /** Rows of the only objects that are shown; null: all are shown. */
+  /**
+   * Row numbers of the objects to which the view is restricted; null: it is not restricted to some
+   * objects.
+   */
   only: readonly number[] | null;
   selected: readonly number[];
   /** Row of the object whose card is open. */

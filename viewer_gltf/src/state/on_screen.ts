@@ -10,7 +10,7 @@ export type ShownSurface = Readonly<{ mesh: Mesh; tile: string; channel: string 
 /** Mip levels of a volume file, still compressed. */
 export type LevelSource = Readonly<{
   volume: TileVolume;
-  /** Returns whether a level is available without fetching. */
+  /** Returns whether a mip level is available without fetching. */
   has(index: number): boolean;
   level(index: number, signal: AbortSignal): Promise<Uint8Array>;
 }>;

@@ -2,7 +2,7 @@
 export type TileProgress = Readonly<{
   /** Number of coarsest tiles with content; null until the tileset has arrived. */
   total: number | null;
-  /** Tiles that are loaded or have failed. */
+  /** Number of coarsest tiles that are loaded or have failed. */
   done: number;
 }>;
 

@@ -10,7 +10,7 @@ import type { ViewerState } from "./viewer_state";
 /** How an action of a part changes the state, and its words. */
 export type ActionRules<A> = Readonly<{
   reduce: (state: ViewerState, action: A) => ViewerState;
-  /** Name of the step in the history, in a few words. */
+  /** Name of the action's undo step, in a few words. */
   name: string;
   /** Whether changes in quick succession, for example by a drag, are one step of the history. */
   isGradual?: boolean;
@@ -56,7 +56,10 @@ export type PartSettings = Readonly<{
 
 const byPart = new Map<string, PartSettings>();
 
-/** Adds the settings of a part, or replaces those of an earlier view of the same part. */
+/**
+ * Adds the settings of a part. If an earlier bundle on this page has added settings of the same
+ * part, they are replaced.
+ */
 export function addSettings(part: string, settings: PartSettings): void {
   byPart.set(part, settings);
 }

@@ -23,15 +23,15 @@ export type EnvironmentName = (typeof ENVIRONMENTS)[number];
 
 export const TONE_MAPS = ["filmic", "none"] as const;
 
-/** Samples of each pixel in a finished image. */
+/** Number of samples of each pixel with which a path-traced image counts as finished. */
 export const ENOUGH_SAMPLES = 1024;
 
 type TraceNumber = Readonly<{
   label: string;
-  /** Value in a bundle that has just opened. */
+  /** Value of the setting in a bundle that has just opened. */
   start: number;
   limits: readonly [number, number];
-  /** Whether equal steps of the slider are equal factors. */
+  /** Whether equal movements of the slider multiply the value by equal factors. */
   isLogarithmic?: boolean;
   text: (value: number) => string;
   /** Explanation of the effect, where the label does not say it. */
@@ -45,9 +45,9 @@ const percent = (value: number) => `${Math.round(100 * value)} %`;
 const degrees = (value: number) => `${Math.round(value)}°`;
 const stops = (value: number) => `${value >= 0 ? "+" : ""}${value.toFixed(1)} stops`;
 
-/** Numbers of the medium that the light passes through. */
+/** Number settings of the specimen as a medium that light passes through. */
 export const MEDIUM_NUMBERS = {
-  /** Added to the intensities before the transfer function. */
+  /** Number that is added to the intensities before the transfer function. */
   bias: {
     label: "Transmission",
     start: 0,
@@ -56,7 +56,10 @@ export const MEDIUM_NUMBERS = {
     about:
       "Shifts the transfer function: a higher value also shows darker material, a lower value only the brightest.",
   },
-  /** Share of the intensities; 0: only the transfer function decides what is empty. */
+  /**
+   * Intensity, 0..1, below which a voxel counts as empty; 0: only the transfer function decides
+   * what is empty.
+   */
   threshold: {
     label: "Threshold",
     start: 0,
@@ -73,7 +76,7 @@ export const MEDIUM_NUMBERS = {
     about:
       "Samples along a ray through the specimen: few are fast, many are exact. Auto takes as many as time allows.",
   },
-  /** Factor to the extinction. */
+  /** Factor to the extinction, which is how much light the medium blocks per length. */
   density: {
     label: "Density",
     start: 1,
@@ -171,11 +174,11 @@ export type TraceSettings = NumbersOf<typeof MEDIUM_NUMBERS> &
   NumbersOf<typeof ENVIRONMENT_NUMBERS> &
   NumbersOf<typeof POST_NUMBERS> &
   Readonly<{
-    /** Whether light is scattered until it leaves the specimen, or once. */
+    /** true: light is scattered until it leaves the specimen; false: it is scattered only once. */
     isMultiple: boolean;
     environment: EnvironmentName;
     lamps: readonly Lamp[];
-    /** Whether the image adjustments are applied. */
+    /** Whether the image adjustments, such as exposure, sharpness and occlusion, are applied. */
     isPostOn: boolean;
     toneMap: (typeof TONE_MAPS)[number];
   }>;

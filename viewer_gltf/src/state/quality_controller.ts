@@ -15,7 +15,7 @@ export type QualitySettings = Readonly<{
   steps: number;
   /** Pixels of the march along an edge of the frame, as a share of the frame's pixels. */
   resolution: number;
-  /** Radius of the focus disc, as a share of the user's setting. */
+  /** Factor, 0..1, to the radius of the focus disc that the user has set. */
   discShare: number;
   /** Screen-space error of the meshes, as a multiple of the usual error. */
   errorFactor: number;
@@ -88,7 +88,10 @@ const PAUSE = 4;
  * row, the next is not one.
  */
 const STALL_FACTOR = 4;
-/** Factor to the budget that a frame may take and still keep it, because displays are unsteady. */
+/**
+ * Factor to the budget up to which a frame counts as in time. Intervals between frames vary with
+ * the display.
+ */
 const TOLERANCE: Readonly<Record<Timing, number>> = { work: 1, interval: 1.15 };
 /** Share of the budget that a frame must be expected to keep before a notch is raised. */
 const MARGIN = 0.9;
@@ -96,7 +99,10 @@ const MARGIN = 0.9;
 const USUAL_PRICE = 1.15;
 /** Share of the usual time below which the load has fallen. */
 const FALLEN_SHARE = 0.85;
-/** Factor over budget for which one notch is lowered. */
+/**
+ * Quality is lowered by one notch if a frame takes the budget times this factor, by two notches if
+ * it takes the budget times its square.
+ */
 const FACTOR_A_NOTCH = 1.25;
 const MAX_NOTCHES = 6;
 const PATIENCE = 90;
@@ -119,7 +125,10 @@ export function initialQuality(timing: Timing, level: QualityLevel = "auto"): Qu
   };
 }
 
-/** Sets the user's level. "auto" begins again from full quality. */
+/**
+ * Sets the quality that the user has chosen: high, low or auto. "auto" begins again from full
+ * quality.
+ */
 export function withLevel(quality: Quality, level: QualityLevel): Quality {
   return level === quality.level ? quality : initialQuality(quality.timing, level);
 }
@@ -206,7 +215,10 @@ function isTrial({ before_ms, before_notch, notch }: Quality): boolean {
   return before_ms > 0 && notch < before_notch;
 }
 
-/** Learns the price of the notches between two levels from the first window after a change. */
+/**
+ * Learns the price of the notches between the previous and the present one, from the first window
+ * of frames after a change.
+ */
 function withPrice(quality: Quality, mean_ms: number): Quality {
   const { before_ms, before_notch, notch } = quality;
   const settled = { ...quality, before_ms: 0, before_notch: notch };

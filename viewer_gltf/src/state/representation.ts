@@ -82,8 +82,8 @@ export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
 }
 
 /**
- * Returns whether volumes still stand for surfaces that are being built. The disc then cuts into no
- * surface.
+ * Returns whether the surfaces of some tile are not built yet, so that its volume is shown instead.
+ * The focus disc then cuts no hole into surfaces.
  */
 function isUnfinished({ tiles }: ViewerState): boolean {
   return tiles.some((tile) => tile.isUnfinished);

@@ -28,8 +28,8 @@ export function sceneLightOf({ lights, specimen: { bounds_um } }: Manifest): Sce
 }
 
 /**
- * Returns the opening settings of path tracing. Light from a stage is set for surfaces, so it needs
- * no other exposure.
+ * Returns the opening settings of path tracing. The author of a stage has set its light for
+ * surfaces, so the exposure is 0 stops.
  */
 export function traceLitBy(lights: Lights | undefined, bounds: Bounds): TraceSettings {
   if (lights === undefined) return START_TRACE;

@@ -5,7 +5,7 @@ export type XrSupport = Readonly<{ isAvailable: boolean; reason: string }>;
 
 export type StereoSupport = Readonly<{
   stereo: XrSupport;
-  /** null: this viewer has no split screen. */
+  /** Whether the split screen of a phone can be used; null: this viewer has no split screen. */
   split: XrSupport | null;
   /** Whether the specimen can stand in the user's own room (augmented reality). */
   hasRoom: boolean;

@@ -27,7 +27,10 @@ export type Functions = Readonly<{
   transferFunctions: readonly string[];
   /** The two-dimensional functions of the bundle. */
   transferFunctions2d: readonly string[];
-  /** null: not fetched yet. It is fetched when something needs it. */
+  /**
+   * Content of the bundle's two-dimensional functions; null: not fetched yet. It is fetched when
+   * something needs it.
+   */
   transfer2d: Transfer2d | null;
   /** The user's own versions of functions, by name. */
   shapes: Readonly<Record<string, Shapes>>;
@@ -79,7 +82,10 @@ export function withShapes<F extends Functions>(functions: F, name: string, shap
 
 const rounded = (x: number) => Math.round(x * STEPS) / STEPS;
 
-/** Rounds a range to the lattice, and keeps at least its least size. */
+/**
+ * Rounds both ends of a range to multiples of 1 / STEPS, with at least a smallest distance between
+ * them.
+ */
 function roundedRange([low, high]: Range, least: number): Range {
   const steps = Math.ceil(least * STEPS - 1e-9);
   const from = Math.min(Math.round(low * STEPS), STEPS - steps);

@@ -110,7 +110,7 @@ function soften(depth: number, softness: number): number {
   return clamp(depth / softness, 0, 1);
 }
 
-/** Returns the intensities between which a shape lies at a gradient magnitude. */
+/** Returns the lowest and highest intensity that a shape covers at one gradient magnitude. */
 function sidesAt(shape: Shape, gradient: number): Range {
   const [low, high] = shape.values;
   if (shape.kind === "rectangle") return shape.values;
@@ -206,8 +206,8 @@ function shifted(low: number, high: number, by: number): Range {
 }
 
 /**
- * Returns the shape with one part moved to a point. It stays inside the histogram, and at least of
- * the smallest size.
+ * Returns the shape with one part moved to a point. The shape stays inside the histogram, and does
+ * not become smaller than MIN_WIDTH.
  */
 export function resize(shape: Shape, part: Part, to: HistogramPoint): Shape {
   if (part === "body") return shape;
@@ -222,7 +222,10 @@ export function resize(shape: Shape, part: Part, to: HistogramPoint): Shape {
   return shape.kind === "rectangle" ? { ...resized, tip: (v0 + v1) / 2 } : resized;
 }
 
-/** Makes a shape of the usual size at a point: a rectangle around it, or a triangle with its tip below it. */
+/**
+ * Makes a shape of a standard size at a point: a rectangle around it, or a triangle with its tip
+ * below it.
+ */
 export function makeShape(kind: ShapeKind, at: HistogramPoint): Shape {
   const [width, height] = [0.2, 0.3];
   const tip = clamp(at.value, 0, 1);

@@ -29,7 +29,10 @@ export type ChannelState = Functions &
     turn: number;
     /** Colour in the bundle. */
     original: Rgb;
-    /** Part of the intensities, 0..1, that the transfer function is stretched over. */
+    /**
+     * Lowest and highest intensity (0..1) of the range over which the transfer function is
+     * stretched.
+     */
     window: readonly [number, number];
     hasSurface: boolean;
     /** Whether the channel is a label map: objects with closed surfaces, and no volume. */
@@ -58,21 +61,21 @@ export type ViewerState = Settings &
   Readonly<{
     channels: readonly ChannelState[];
     tiles: readonly TileState[];
-    /** Views of the channels that are label maps. */
+    /** How the objects of each label map are shown, by channel. */
     objects: ObjectViews;
     /** Tile nearest to the specimen's centre. */
     middle: string;
-    /** Tile that was chosen; null: the gaze chooses. */
+    /** Tile that the user has selected; null: none, so that volumes follow the gaze. */
     selected: string | null;
     /** The only tile that is shown; null: all tiles are. */
     isolated: string | null;
-    /** Part of the specimen that the cuts leave, um. */
+    /** Clip box and clip plane, um, which cut away parts of the specimen. */
     clip: Clip;
     /** Views that a video goes through. */
     keptViews: readonly KeptView[];
     /** Whether this device can trace paths, for which it must draw into floating-point textures. */
     canTrace: boolean;
-    /** Faults that leave the rest usable, newest last. */
+    /** Messages about faults despite which the viewer stays usable, newest last. */
     notices: readonly string[];
     /** Notices of faults that another attempt may solve. */
     retryable: readonly string[];

@@ -20,7 +20,7 @@ export async function makeTextureLoader(renderer: WebGLRenderer): Promise<KTX2Lo
     return worker;
   });
   loader.transcoderBinary = binary;
-  // three.js's loader then does not load its own transcoder.
+  // The transcoder counts as loaded, so three.js's loader does not load its own one.
   loader.transcoderPending = Promise.resolve();
   return loader;
 }

@@ -33,7 +33,7 @@ const CLOSED = { tile: null, faces: new Map<string, Face>() };
 export type SurfaceOptions = Readonly<{
   loader: SurfaceLoader;
   frame: SurfaceFrame;
-  /** For all channels together. */
+  /** Largest GPU memory and number of triangles for the surfaces of all channels together. */
   budget: Pick<MemoryBudget, "surfaces" | "triangles">;
   /** How far the volume of a tile and channel has faded in, 0 to 1. */
   presence: (tile: string, channel: string) => number;
@@ -44,7 +44,7 @@ export type SurfaceOptions = Readonly<{
 }>;
 
 export class SurfaceSet implements Surfaces {
-  /** In um, world. */
+  /** The surfaces of all channels; coordinates are in um of the world. */
   readonly group = new Group();
   private readonly tilesets = new Map<string, SurfaceTileset>();
   private readonly toWorld = new Matrix4();
@@ -55,7 +55,7 @@ export class SurfaceSet implements Surfaces {
    * The tile that is drawn as a volume, and the faces of its neighbours towards it, by neighbour.
    */
   private open: Readonly<{ tile: string | null; faces: ReadonlyMap<string, Face> }> = CLOSED;
-  /** Whether the overview was complete once. */
+  /** Whether the coarsest surfaces of all shown channels have been loaded at least once. */
   private hasBegun = false;
   private errorTarget_px = ERROR_TARGET_PX;
   /** How much coarser the surfaces are drawn, so that the device keeps its frame rate. */
@@ -71,7 +71,9 @@ export class SurfaceSet implements Surfaces {
     return overview(this.shown().map(([, tileset]) => tileset.progress));
   }
 
-  /** Whether one channel shows all tiles. */
+  /**
+   * Whether all tiles of the first shown channel are on screen; also true if no channel is shown.
+   */
   get hasFirst(): boolean {
     const [first] = this.shown();
     return first === undefined || overview([first[1].progress]).isComplete;

@@ -89,7 +89,7 @@ export class SurfaceTileset {
     this.tiles.registerPlugin({
       name: "STEREOCELL_BUNDLE",
       fetchData: (url: string, { signal }: RequestInit) => files.fetch(url, signal),
-      // before the renderer adds its own `tile` to each userData
+      // called before the renderer adds its own `tile` to each userData
       processTileModel: (scene: Object3D, tile: Tile) => this.adopt(scene, tile),
     });
     this.tiles.addEventListener("load-root-tileset", () => {
@@ -186,7 +186,10 @@ export class SurfaceTileset {
     return this.drawn.reduce((sum, { triangles }) => sum + triangles, 0);
   }
 
-  /** The levels of each tile that was in view in the last frame, as far as they are known. */
+  /**
+   * The levels of detail (LODs) of each tile that was in view in the last frame, as far as they are
+   * known.
+   */
   get inView(): readonly Levels[] {
     const { triangles } = this.channel;
     const coarsest = this.tiles.root?.children ?? [];

@@ -1,8 +1,8 @@
 /** Makes surfaces coarser if those in view have more triangles than the device can draw in time. */
 
 /**
- * The levels of a tile in view, coarsest first: the error on screen, infinite at the eye, and the
- * triangles.
+ * The levels of detail of a tile in view, coarsest first: for each, its error on screen (infinite
+ * at the eye) and its number of triangles.
  */
 export type Levels = readonly Readonly<{ error_px: number; triangles: number }>[];
 
@@ -12,9 +12,15 @@ export type Levels = readonly Readonly<{ error_px: number; triangles: number }>[
 export type Coarser = Readonly<{ factor: number; leftOut: number }>;
 
 const FACTORS = [1, Math.SQRT2, 2, 2 * Math.SQRT2, 4] as const;
-/** More levels than tiles have. */
+/**
+ * Number of choices of how many of the finest levels of detail are left out; tiles have fewer
+ * levels.
+ */
 const MAX_LEVELS = 8;
-/** Finest first; the first one changes nothing. */
+/**
+ * All choices of how much coarser surfaces are drawn, finest first; the first choice changes
+ * nothing.
+ */
 const ALL: readonly Coarser[] = Array.from({ length: MAX_LEVELS }, (_, leftOut) =>
   FACTORS.map((factor) => ({ factor, leftOut })),
 ).flat();

@@ -29,7 +29,7 @@ export class PlacedCard {
     const number = ++this.taps;
     const isByKey = by === "key";
     const tapped = await this.find(ray);
-    // the card of another place closes at once
+    // a card that is open beside an earlier tapped point closes at once
     if (number === this.taps) this.hide();
     const rest_ms = isByKey ? 0 : time_ms + DOUBLE_MS - performance.now();
     await new Promise((resolve) => setTimeout(resolve, Math.max(0, rest_ms)));

@@ -64,7 +64,7 @@ function tileItems(state: ViewerState, focusTile: string | null): readonly Contr
   return items;
 }
 
-/** A specimen of one tile has no such section. */
+/** Returns the section of the tiles; an empty list if the specimen has only one tile. */
 export function tileSections(state: ViewerState, focusTile: string | null): readonly PartSection[] {
   if (state.tiles.length < 2) return [];
   return [{ rank: 40, id: "tiles", label: "Tiles", items: tileItems(state, focusTile) }];

@@ -73,7 +73,8 @@ export class Marches implements DrawnMarches {
   }
 
   /**
-   * Values that change when the marches look different, such as a new level or a step of a fade.
+   * Values that change when the marches look different, such as a new mip level or a step of a
+   * fade.
    */
   get key(): readonly unknown[] {
     return this.drawn.map(({ march, packed, resident: { texture, presence } }) => [
@@ -137,7 +138,9 @@ export class Marches implements DrawnMarches {
     shown: Packed,
     appearances: readonly Appearance[],
   ): Promise<void> {
-    march.skipBy(null); // parts that the old table skips may be visible now
+    // nothing is skipped until the new table is computed: bricks that the old table skips may be
+    // visible now
+    march.skipBy(null);
     this.skipsUnderWay++;
     const distances = await this.occupancy
       .computeDistances(march.volume.tile, {
@@ -153,7 +156,7 @@ export class Marches implements DrawnMarches {
     march.skipBy(distances);
   }
 
-  /** Shows each march as far as it has faded in. */
+  /** Passes to each march how far its volume, and the newest mip level of it, have faded in. */
   show(): void {
     for (const { march, texture, packed, presence } of this.residents.all) {
       if (march === null || packed === null) continue;

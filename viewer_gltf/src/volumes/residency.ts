@@ -12,7 +12,9 @@ import type { TileMarch } from "./tile_raymarch";
 const PRESENCE_S = 0.25;
 /** Number of tiles that stay for a while after the gaze has left them, since it often returns. */
 const KEPT_TILES = 2;
-/** Factor for the bytes of a level together with the next coarser one; both stay during a fade. */
+/**
+ * Factor for the bytes of a mip level together with the next coarser one; both stay during a fade.
+ */
 const WITH_OLD_LEVEL = 9 / 8;
 
 export type Resident = {
@@ -21,9 +23,9 @@ export type Resident = {
   /** Source of the march's tables. */
   packed: Packed | null;
   wanted: WantedTile | null;
-  /** 0 to 1. */
+  /** How far the volumes of the tile have faded in, 0 to 1. */
   presence: number;
-  /** Number of the request in which it was last wanted. */
+  /** Number of the request in which the tile was last wanted; larger is more recent. */
   turn: number;
 };
 
@@ -57,7 +59,7 @@ export class Residency {
     return resident;
   }
 
-  /** Bytes for each tile if this number of tiles is wanted. */
+  /** Returns the GPU memory, in bytes, that one tile may use if `wanted` tiles are needed. */
   share(wanted: number): number {
     return this.budget / (WITH_OLD_LEVEL * (wanted + KEPT_TILES));
   }
@@ -80,7 +82,9 @@ export class Residency {
     return resident.packed?.channels.includes(channel) ? resident.presence : 0;
   }
 
-  /** Advances all fades, including those between levels. Returns whether any is still going on. */
+  /**
+   * Advances all fades, including those between mip levels. Returns whether any is still going on.
+   */
   advance(dt_s: number): boolean {
     let isFading = false;
     for (const resident of this.residents.values()) {

@@ -4,7 +4,10 @@ import type { Control, PartSection } from "../panel/controls";
 import { DISC_RADIUS, MODE, VOLUMES } from "../state/parameters/volumes";
 import { hasVolumes, type ViewerState } from "../state/viewer_state";
 
-/** @param discLimit_deg radius to which the limit of tiles reduces the disc; null if it does not */
+/**
+ * @param discLimit_deg radius, degrees, to which the largest number of tiles reduces the focus
+ * disc; null if it does not reduce it
+ */
 export function volumeSections(
   state: ViewerState,
   discLimit_deg: number | null,

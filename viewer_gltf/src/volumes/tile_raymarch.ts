@@ -39,7 +39,7 @@ import { distanceInGrid } from "./blend_order";
 import { occupiedCorners } from "./occupied_bricks";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 
-/** Voxels. Shortest step. */
+/** Shortest step along a ray, in voxels. */
 const STEP_VOXELS = 1;
 /** Opacity, 0 to 1, at which a ray ends. */
 const OPAQUE = 0.99;
@@ -67,7 +67,10 @@ const ADDED = { ...OVER, blendDst: OneFactor };
 
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
-  /** All zeros, so that nothing is skipped, until the table is computed. */
+  /**
+   * Distance table by which rays skip empty bricks. Until it is computed, it is all zeros, so that
+   * nothing is skipped.
+   */
   private readonly skips: Uint8Array<ArrayBuffer>;
   private readonly occupancy: Data3DTexture;
   readonly tables: MarchTables;
@@ -241,7 +244,7 @@ export class TileMarch {
     uniforms.uFresh.value = fresh;
     uniforms.uPresence.value = presence;
     const coarsest = Math.max(shown.level, old?.level ?? 0);
-    // streamed bricks have ranges of the drawn level, even if it is coarse
+    // the value ranges of streamed bricks are those of the drawn mip level, even if it is coarse
     const isExact = coarsest === 0 || shown.index !== null;
     uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / SKIP_BRICK);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
@@ -253,8 +256,8 @@ export class TileMarch {
   }
 
   /**
-   * Takes over colours and tables, by uploading a few kilobytes. Returns whether the visible part
-   * may differ.
+   * Takes over colours and tables, by uploading a few kilobytes. Returns whether other voxels may
+   * be visible than before.
    */
   setAppearances(appearances: readonly Appearance[]): boolean {
     const differs = this.tables.sync(appearances);

@@ -12,7 +12,8 @@ type Shift = Pick<TraceSettings, "bias" | "threshold">;
  * Returns the table with its settings applied.
  *
  * @param table RGBA, rows of 256 entries
- * @param bias shift towards the opacity of brighter values, as a share
+ * @param bias number that is added to an intensity, 0..1, before its colour and opacity are looked
+ * up
  * @param threshold share of the intensities below which voxels are empty
  */
 export function tracedTable<T extends Uint8Array>(table: T, { bias, threshold }: Shift): T {

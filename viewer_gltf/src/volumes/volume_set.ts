@@ -26,7 +26,10 @@ import { Marches } from "./marches";
 import { Residency, type Resident } from "./residency";
 
 const PARALLEL_LOADS = 4;
-/** Bytes. Largest level of a channel in a tile while the march only stands in for path tracing. */
+/**
+ * Largest size, in bytes, of the mip level of a channel in a tile while the march only stands in
+ * for path tracing.
+ */
 const STAND_IN_BYTES = 2 ** 21;
 
 export class VolumeSet implements MarchedVolumes, Volumes {
@@ -70,7 +73,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     );
   }
 
-  /** Whether a wanted volume is not shown at any level. */
+  /** Whether a wanted volume is not shown at any mip level. */
   get isIncomplete(): boolean {
     return this.wanted.some(({ tile, channels }) => {
       const shown = this.residents.get(tile)?.texture.shown?.channels ?? [];
@@ -104,8 +107,8 @@ export class VolumeSet implements MarchedVolumes, Volumes {
   }
 
   /**
-   * A text that changes when a march would look different: with each loaded level and each step of
-   * a fade.
+   * A text that changes when a march would look different: with each loaded mip level and each step
+   * of a fade.
    */
   get marchKey(): string {
     return JSON.stringify([this.status(), this.marches.key]);
@@ -156,7 +159,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     return points.length === 0 ? null : points;
   }
 
-  /** Whether all wanted volumes of a tile are loaded, at some level. */
+  /** Whether all wanted volumes of a tile are loaded, at any mip level. */
   isReady(tile: string): boolean {
     const resident = this.residents.get(tile);
     const shown = resident?.texture.shown;
@@ -176,7 +179,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
   /**
    * Takes over the state and the wanted volumes.
    *
-   * @param mayRefine false while the gaze wanders, so that no finer levels are loaded
+   * @param mayRefine false while the gaze wanders, so that no finer mip levels are loaded
    */
   sync(state: ViewerState, wanted: readonly WantedTile[], mayRefine: boolean): void {
     // A host that streams bricks sends a tile's bricks to one receiver only: to path tracing while
@@ -214,7 +217,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     if (texture instanceof SharpenedTile) texture.sharpen();
   }
 
-  /** Limits the texture edge from the next `sync` on. */
+  /** Limits the number of voxels along an edge of a tile's volume, from the next `sync` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
   }
@@ -252,7 +255,10 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1), finest);
   }
 
-  /** Reports once that the drawn level is coarser than the finest level. */
+  /**
+   * Reports once that a volume can be drawn only at a mip level that is coarser than the finest one
+   * of its file.
+   */
   private reportLimit({ volume }: VolumeSource): void {
     const { side } = this.limits;
     const longest = Math.max(...volume.size);

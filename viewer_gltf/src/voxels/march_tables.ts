@@ -87,8 +87,8 @@ export class MarchTables {
   }
 
   /**
-   * Takes over colours and tables, by uploading a few kilobytes. Returns whether the visible part
-   * may differ.
+   * Takes over colours and tables, by uploading a few kilobytes. Returns whether other voxels may
+   * be visible than before.
    */
   sync(appearances: readonly Appearance[]): boolean {
     const { uniforms } = this;

@@ -1,14 +1,14 @@
 /** The mip levels of a volume to fetch, coarse first. */
 import type { MipLevel } from "../bundle/generated/volumes";
 
-/** Bytes. Largest level for the first image; the first level is the finest one within this. */
+/** Largest size, in bytes, of the mip level that is fetched first, for a quick first image. */
 const FIRST_LEVEL_BYTES = 64 * 1024;
 
-/** Limits for volumes, together or each. */
+/** Limits of GPU memory and of texture sizes for volumes. */
 export type VolumeLimits = Readonly<{
-  /** Bytes of GPU memory. */
+  /** Largest size in GPU memory, bytes. */
   bytes: number;
-  /** Texels along an edge that a texture may have. */
+  /** Largest number of texels along an edge of a texture. */
   side: number;
   /** Largest number of voxels along a tile's edge; Infinity: as many as fit. */
   edge: number;

@@ -1,6 +1,7 @@
 /**
- * The GPU texture of one tile: up to four channels side by side, coarse first, replaced as finer
- * levels arrive. Finer levels fade in; another set of channels replaces the texture at once.
+ * The GPU texture of one tile: up to four channels side by side. A coarse mip level is shown first,
+ * and finer ones fade in as they arrive. If other channels are wanted, the texture is replaced at
+ * once.
  */
 import type { Data3DTexture } from "three";
 import { DecodeError, decodeTexels } from "../bundle/decode";
@@ -73,7 +74,7 @@ export class TileTexture {
     this.failed.clear();
   }
 
-  /** Loads these channels and levels, given coarse to fine; loaded levels are kept. */
+  /** Loads these channels and mip levels, given coarse to fine; loaded levels are kept. */
   want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
     for (const [id, source] of this.sources) {
       if (sources.get(id) === source) continue;
@@ -137,13 +138,14 @@ export class TileTexture {
       if (this.levels.length > 0 && this.finest > shown.level) return this.finest;
       return this.levels.find((index) => index < shown.level) ?? null;
     }
-    // the finest level of which all channels are loaded; otherwise the first of the list
+    // the finest mip level of which all channels are loaded; if there is none, the first level of
+    // the list
     const isHere = (index: number) =>
       channels.every((id) => this.sources.get(id)?.has(index) === true);
     return [...this.levels].reverse().find(isHere) ?? this.levels[0] ?? null;
   }
 
-  /** Loads one level of all channels. Returns null if one of them failed, which is reported. */
+  /** Loads one mip level of all channels. Returns null if one of them failed, which is reported. */
   private async load(
     channels: readonly string[],
     level: number,

@@ -20,8 +20,8 @@ export function volumeOfBricks(volume: TileVolume): TileVolume {
 export class VolumeSource {
   private whole: Uint8Array<ArrayBuffer> | null = null;
   /**
-   * Loaded levels, kept while the volume is wanted, because another set of channels packs them
-   * again.
+   * Loaded mip levels by their index. They are kept while the volume is wanted, because they are
+   * packed again for another set of channels.
    */
   private readonly levels = new Map<number, Uint8Array>();
   private ranges: Uint8Array | null = null;
@@ -48,7 +48,7 @@ export class VolumeSource {
     return this.ranges;
   }
 
-  /** The zstd frame of level `index`. Throws BundleError or AbortError. */
+  /** Returns the zstd frame of mip level `index`. Throws BundleError or AbortError. */
   async level(index: number, signal: AbortSignal): Promise<Uint8Array> {
     let bytes = this.levels.get(index);
     if (bytes === undefined) {

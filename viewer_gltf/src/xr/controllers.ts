@@ -48,7 +48,7 @@ const LINE_RADIUS_M = 0.0012;
 const LINE_M = 1.5;
 
 export class Hand {
-  /** Null if the source points with the gaze, or is not tracked now. */
+  /** Ray along which the source points; null if it points with the gaze, or is not tracked now. */
   ray: SceneRay | null = null;
   /** Pose of the hand's grip; null if it is not tracked now. */
   pose: HandPose | null = null;
@@ -87,7 +87,7 @@ export class Hand {
 }
 
 export class Controllers {
-  /** The drawn rays. */
+  /** Scene objects of the rays that are drawn from the hands. */
   readonly group = new Group();
   hands: readonly Hand[] = [];
   private readonly tube = lineGeometry();

@@ -35,7 +35,7 @@ const HOLD_M = 0.02;
 const HEAD_HOLD_S = 0.6;
 
 type Press = {
-  /** The target at which it was pressed, and the place of the hand. */
+  /** The target at which the button was pressed, and the place of the hand at that time. */
   readonly hit: TargetHit | null;
   readonly at: Vector3 | null;
   elapsed_s: number;
@@ -233,7 +233,8 @@ export class Grips {
     }
     repeating.elapsed_s += dt_s;
     if (repeating.elapsed_s < HOLD_S) return false;
-    if (press != null) press.isUsed = true; // so its release does not count as another step
+    // the release of the button then does not count as another step
+    if (press != null) press.isUsed = true;
     return this.options.run(hit.repeats, state, STEPS_PER_S * dt_s);
   }
 
@@ -252,7 +253,7 @@ export class Grips {
       return false;
     }
     const { gaze } = this.aim;
-    press.isUsed = true; // so its release chooses nothing
+    press.isUsed = true; // the release of the button then chooses nothing
     if (this.headHold === null) {
       this.headHold = this.mover.holdBy(gaze, state);
       return false;

@@ -9,8 +9,8 @@ type Eye = Pick<Object3D, "matrixWorld">;
 const [position, turn, size] = [new Vector3(), new Quaternion(), new Vector3()];
 
 /**
- * Returns the pose midway between the eyes, written to `head`. Displays that are turned outwards
- * must be turned by the same angle.
+ * Returns the pose midway between the eyes, written to `head`. If the displays are turned outwards,
+ * both must be turned by the same angle.
  */
 export function betweenEyes(eyes: readonly Eye[], head = new Matrix4()): Matrix4 {
   const [left, right] = eyes;

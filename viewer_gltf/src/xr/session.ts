@@ -83,7 +83,7 @@ export class XrSession {
       this.renderer.xr.setReferenceSpaceType(this.hasFloor ? "local-floor" : "local");
       await this.renderer.xr.setSession(session);
     } catch (error) {
-      this.session = null; // allows another start
+      this.session = null; // allows the user to start another session
       void session.end().catch(() => undefined); // fails if the session has ended by itself
       throw error;
     }

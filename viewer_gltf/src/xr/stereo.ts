@@ -30,7 +30,7 @@ export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
 
 export type EyeSettings = Readonly<{
   distance_m: number;
-  /** Factor of `distance_m`. */
+  /** Factor to the distance between the eyes; 0 shows both eyes the same image. */
   strength: number;
   /** CSS pixels per inch of the screen; null: estimated from the browser's name. */
   cssPixelsPerInch: number | null;
@@ -93,7 +93,10 @@ export class Stereo {
     return this.loading;
   }
 
-  /** Passes choices on the page to the headset panel. */
+  /**
+   * Passes to the headset panel what the user has chosen in the panel of the page, such as open
+   * sections.
+   */
   showInPanel(choices: Partial<PanelView>): void {
     this.choices = { ...this.choices, ...choices };
     this.hands?.panel.take(choices);

@@ -7,7 +7,7 @@
 const int MAX_EVENTS = 8192;
 
 struct Bricks {
-  vec3 pace;  // bricks per um
+  vec3 pace;  // bricks per um along each axis of the box
   ivec3 cell;
   ivec3 way;
   vec3 wall;  // lengths along the ray to the next brick boundary of each axis

@@ -1,4 +1,5 @@
-// Where a ray enters and leaves the box from `low` to `high` (slab test, Kay & Kajiya 1986).
+// Distances along a ray, in lengths of its direction, at which it enters (x) and leaves (y) the box
+// from `low` to `high`. It misses the box if x > y (slab test, Kay & Kajiya 1986).
 vec2 intersectBox(vec3 eye, vec3 invDir, vec3 low, vec3 high) {
   vec3 a = (low - eye) * invDir;
   vec3 b = (high - eye) * invDir;

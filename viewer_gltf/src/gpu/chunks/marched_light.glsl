@@ -5,7 +5,7 @@ uniform sampler2D uMarched;  // premultiplied, linear; with ENCODED its colours 
 uniform highp sampler2D uSceneDepth;
 uniform int uEyeCount;
 uniform vec4 uEyes[2];  // each eye's part of the frame: x, y, width, height, pixels
-uniform vec4 uParts[2];  // each eye's part of uMarched, likewise
+uniform vec4 uParts[2];  // each eye's part of uMarched: x, y, width, height, pixels
 
 // Difference of depths that count as similar, as a share of the depth's distance to the far plane.
 const float ALIKE = 0.02;
@@ -37,7 +37,7 @@ vec4 marchedLight(vec2 pixel) {
   float total = 0.0;
   for (int k = 0; k < 4; k++) {
     vec2 side = vec2(k & 1, k >> 1);
-    vec2 tap = clamp(corner + side, vec2(0.0), part.zw - 1.0);  // never a pixel of the other eye
+    vec2 tap = clamp(corner + side, vec2(0.0), part.zw - 1.0);  // stays within this eye's part
     vec2 source = (tap + 0.5) / scale + eye.xy;
     float there = 1.0 - texelFetch(uSceneDepth, ivec2(source), 0).r;
     vec2 near = mix(1.0 - share, share, side);

@@ -11,8 +11,9 @@ struct History {
   vec4 moments;
 };
 
-// Whether a tile takes a sample in this frame. Frames that draw only some tiles alternate. A noisy
-// tile uses each of its turns, a calm one only some, so that details that it missed still appear.
+// Whether the pixels of a tile of the frame take a sample in this pass. Passes that draw only some
+// tiles take turns. A noisy tile uses each of its turns, a calm one only some, so that details that
+// it missed still appear.
 bool isDrawn(ivec2 tile) {
   seedRandom(uvec3(tile, 0u));
   float turn = fract(random() - uTurn.x);

@@ -5,7 +5,7 @@ precision highp float;
 #ifdef CROSSING
 uniform bool uIsCrossing;
 uniform mat4 uToScene[2];  // from each eye's clip space to the scene
-uniform vec3 uEyeAt[2];  // metres
+uniform vec3 uEyeAt[2];  // position of each eye in the scene, metres
 uniform float uRim;  // metres: distance at which pixels without a surface are weighted
 uniform vec3 uApex;
 uniform vec3 uAxis;

@@ -3,9 +3,9 @@
 // earlier frame is mixed in.
 precision highp float;
 
-uniform sampler2D uLight;  // linear
-uniform sampler2D uBefore;  // linear
-uniform float uShareBefore;  // 0 to 1
+uniform sampler2D uLight;  // light of this frame, linear
+uniform sampler2D uBefore;  // light of the frame before a jump, linear
+uniform float uShareBefore;  // share of uBefore in the result, 0 to 1
 
 out vec4 oColor;
 

@@ -23,7 +23,7 @@ export type BarInputs = Readonly<{
   page: Page | null;
   /** Whether the last choice can be undone now. */
   canUndo: boolean;
-  /** The mode that switching volumes on returns to. */
+  /** The mode of drawing volumes that is set when the user switches volumes on again. */
   lastMode: Mode;
 }>;
 
@@ -64,7 +64,10 @@ export function barOf(facts: BarInputs): Pick<Page, "marks" | "regions"> {
   return { marks, regions: [...regions, ...undo] };
 }
 
-/** Draws Undo in the lower left place, which is empty except for some seconds after a choice. */
+/**
+ * Draws the button *Undo* at the lower left of the bar. It is shown only for some seconds after a
+ * choice.
+ */
 function undoAt(marks: Mark[]): readonly Region[] {
   const rect: Rect = { ...SLOT, y: SLOT.height };
   marks.push(box(rect, "back", "accent"), text(rect, "Undo", { align: "center" }));

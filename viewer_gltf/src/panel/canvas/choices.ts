@@ -21,7 +21,10 @@ const LARGEST_CELL = 160;
 const MAP_HEIGHT = 5 * ROW;
 /** Smallest cell, px: 4.5 degrees at 1.2 m, so that a gaze can hit it. */
 const SMALLEST_CELL = 78;
-/** Number of targets that a tile map counts as, so that a page has room for two switches beside it. */
+/**
+ * Number that a tile map counts toward MAX_TARGETS of a page, which leaves two for switches beside
+ * it.
+ */
 const MAP_TARGETS = 4;
 
 /** Draws options side by side. */

@@ -49,7 +49,7 @@ export type Mark =
 /** Changes of the panel in the scene only, which shows one page at a time. */
 export type CanvasChange =
   | Readonly<{ canvas: "open" }>
-  /** Opens a section; null: the list of all sections. */
+  /** Opens a section; `section` null opens the list of all sections. */
   | Readonly<{ canvas: "tab"; section: string | null }>
   /** Shows the colours that a channel can have beside its swatch. */
   | Readonly<{ canvas: "fan"; group: string }>
@@ -70,8 +70,8 @@ export type CanvasChange =
 export type CanvasRequest = Request | CanvasChange;
 
 /**
- * A target for a ray. `to` gets the place in the region, 0..1 from the left and from the upper
- * edge, and returns a request; null: nothing changes.
+ * A target for a ray. `to` gets the point in the region that the ray hits, 0..1 from the left and
+ * from the upper edge, and returns a request; null: nothing changes.
  */
 export type Region = Readonly<{
   id: string;
@@ -100,7 +100,9 @@ export type Block = Readonly<{
   height: number;
   marks: readonly Mark[];
   regions: readonly Region[];
-  /** Number of targets that count on a page; absent: the number of regions. */
+  /**
+   * Number that the block counts toward MAX_TARGETS of a page; absent: the number of its regions.
+   */
   targets?: number;
 }>;
 

@@ -51,7 +51,7 @@ export type Page = Readonly<{
   title: string;
   marks: readonly Mark[];
   regions: readonly Region[];
-  /** Number of the page, from 0, and of all pages. */
+  /** Number of the shown page, counted from 0, and the number of all pages. */
   page: number;
   count: number;
   /** Where *Back* leads, one level up; null: this is the list of sections. */
@@ -67,8 +67,8 @@ function shownSections({ sections }: Layout): readonly Section[] {
 }
 
 /**
- * Distributes blocks to pages without splitting a block. A page has at most six targets, unless one
- * block has more.
+ * Distributes blocks (rows and larger pieces) to pages without splitting a block. A page has at
+ * most six targets, unless one block has more.
  *
  * @param height height of a page, px
  */

@@ -1,4 +1,4 @@
-/** A picture that its owner draws, on the panel's canvas. Pure. */
+/** Draws on the panel's canvas a picture whose content another part of the viewer makes. Pure. */
 import type { Picture } from "../controls";
 import type { Block, Rect } from "./draw_list";
 import { captioned, one, region, unlessRefused } from "./parts";

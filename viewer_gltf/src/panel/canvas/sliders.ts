@@ -18,7 +18,10 @@ type Track = Readonly<{
   to: (value: number) => Request;
 }>;
 
-/** Draws the text in the upper half and the track in the lower half. The whole row takes a drag. */
+/**
+ * Draws a slider: its text in the upper half of the row, its track in the lower half. The user can
+ * drag anywhere in the row.
+ */
 function track(slider: Track, row: Rect): Block {
   const words: Rect = { ...row, height: WORDS };
   const end = ROW / 2; // a knob at either end then stays in the region

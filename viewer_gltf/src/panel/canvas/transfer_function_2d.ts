@@ -11,7 +11,10 @@ import { captioned, one, region, unlessRefused } from "./parts";
 const HEIGHT = 440;
 /** Space for the texts of the axes, px. */
 const AXIS = 52;
-/** Reach of a corner, px; large because a ray trembles. */
+/**
+ * Largest distance from a corner or an edge at which a ray grabs it, px; large because a ray
+ * trembles.
+ */
 const REACH = 36;
 const HANDLE = 32;
 
@@ -25,7 +28,10 @@ function handlesOf(shape: Shape): readonly HistogramPoint[] {
   return [...upper, tip, ...(bottom > 0 ? [{ value: middleAt(shape), gradient: bottom }] : [])];
 }
 
-/** Returns the middle of the edge where a triangle is cut off. */
+/**
+ * Returns the intensity in the middle of a triangle's lower edge, where it is cut off above its
+ * tip.
+ */
 function middleAt({ values: [low, high], gradients: [bottom, top], tip }: Shape): number {
   return tip + (((low + high) / 2 - tip) * bottom) / top;
 }

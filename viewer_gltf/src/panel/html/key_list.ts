@@ -190,7 +190,7 @@ export class Help {
     this.onChange(this.changes);
   }
 
-  /** Shows the present key of each row. */
+  /** Writes into each row of the list the key that now has the row's function. */
   private write(): void {
     for (const { label, caps } of this.rows) {
       for (const { name, root } of caps) {

@@ -78,7 +78,7 @@ export class Notices {
   }
 }
 
-/** Result of moving closer or waiting, by mode. */
+/** Second half of the hint, by mode: what the user sees after moving closer or waiting. */
 const NEXT_STEP: Readonly<Partial<Record<Mode, string>>> = {
   disc: ", move closer for volumes",
   tile: ", move closer for volumes",
@@ -87,7 +87,7 @@ const NEXT_STEP: Readonly<Partial<Record<Mode, string>>> = {
 
 /** How to begin: a line over a view that nobody has touched yet. */
 export class FirstHint {
-  /** The second half of the line, for which a small window has no space. */
+  /** The second half of the hint, which is hidden in a small window. */
   private readonly outcome = element("span");
   readonly root: HTMLElement;
 

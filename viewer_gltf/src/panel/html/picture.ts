@@ -1,4 +1,7 @@
-/** A picture that only its owner can draw, and which reports the places of presses and drags. */
+/**
+ * A canvas in the panel whose content another part of the viewer draws. It reports the points of
+ * presses and drags.
+ */
 import { element, setText } from "../../dom/element";
 import type { Picture, Request } from "../controls";
 import { withExplainer } from "./explain";

@@ -59,7 +59,9 @@ export function makeWindow(first: Window, send: Send): Widget<Window> {
       });
       track.style.setProperty("--low", String(low));
       track.style.setProperty("--high", String(high));
-      track.classList.toggle("at-the-end", low > 0.5); // the lower thumb must then be on top
+      // if both thumbs are in the upper half, the lower one is on top, so that it can still be
+      // moved
+      track.classList.toggle("at-the-end", low > 0.5);
       setText(text, `${control.texts[0]} – ${control.texts[1]}`);
     },
   };

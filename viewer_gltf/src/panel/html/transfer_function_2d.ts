@@ -19,7 +19,7 @@ const HANDLE = 22;
 /** Space around the histogram, px of the canvas, for the half of a handle beyond its edge. */
 const PAD = 14;
 const PLANE: Rect = { x: PAD, y: PAD, width: WIDTH - 2 * PAD, height: HEIGHT - 2 * PAD };
-/** Reach of the pointer, px of the page. */
+/** Largest distance from a corner or an edge at which a pointer grabs it, px of the page. */
 const MOUSE_REACH = 8;
 const FINGER_REACH = 22;
 /** One step of an arrow key, as a share of the histogram. */

@@ -13,7 +13,8 @@ layout(location = 0) out vec4 oColor;
 // Numbers of samples from which a pixel keeps a part of its own colour, and all of it.
 const float FEW = 16.0;
 const float ENOUGH = 192.0;
-const float DEPTH_SLACK = 0.01;  // share of the box's longest edge
+// tolerated difference in distance, as a share of the box's longest edge
+const float DEPTH_SLACK = 0.01;
 
 float luminanceOf(vec3 c) {
   return dot(c, vec3(0.2126, 0.7152, 0.0722));

@@ -6,13 +6,13 @@ precision highp int;
 precision highp sampler3D;
 precision highp usampler3D;
 
-uniform vec3 uSize;  // um
+uniform vec3 uSize;  // um: edges of the box around all paths
 uniform vec3 uTexLow;  // texture coordinates at the box's low corner
-uniform vec3 uTexPerUm;  // y falls
-uniform float uVoxel;  // um, finest spacing
+uniform vec3 uTexPerUm;  // texture coordinates per um; negative along y
+uniform float uVoxel;  // um: finest voxel spacing
 uniform vec3 uTexels;  // size of the traced block, texels
 uniform sampler3D uVolume;
-uniform usampler3D uIndex;  // with STREAM_BRICK
+uniform usampler3D uIndex;  // only with STREAM_BRICK: slot and level of each cell's brick
 uniform sampler3D uOldVolume;  // always equal to uVolume, because nothing fades in
 uniform float uFresh;
 uniform sampler2D uMedium;  // 256 x CHANNELS: albedo, extinction per um; TWO_D: 64 rows each, by gradient
@@ -24,39 +24,41 @@ uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;
 uniform vec4 uCorner[3];
 
-uniform mat4 uToBox;  // from normalised device coordinates
-uniform vec3 uEyeAt;  // um, box
+// From normalised device coordinates to um of the box, for the view in which paths begin.
+uniform mat4 uToBox;
+uniform vec3 uEyeAt;  // um, from the box's low corner: the eye at which paths begin
 uniform mat4 uSceneToBox;  // as uToBox, but of the current eye, which may have moved a little since
 uniform mat3 uToEnvironment;  // rotates directions from the box to the environment
-uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels ...
-uniform vec4 uEye;  // ... and of the picture
+uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
+uniform vec4 uEye;  // the eye's part of the frame buffer: x, y, width, height, pixels
 uniform sampler2D uSceneDepth;
 
 uniform sampler2D uEnvironment;
 uniform sampler2D uAliases;
-uniform float uEnvironmentLight;  // factor
+uniform float uEnvironmentLight;  // factor to the radiance of the environment
 uniform int uLampCount;
 uniform vec4 uLamps[3];  // um, from the box's low corner: centre of a sphere, and its radius
 uniform vec3 uLampLight[3];  // radiant intensity, um^2: irradiance is this by squared distance
-uniform int uScatters;  // largest number of scatterings of a path ...
-uniform vec3 uBeyond;  // ... after which it receives this radiance
-uniform float uAnisotropy;  // Henyey-Greenstein g
+uniform int uScatters;  // largest number of scatterings of a path
+uniform vec3 uBeyond;  // radiance that a path receives after uScatters scatterings
+uniform float uAnisotropy;  // asymmetry g of Henyey and Greenstein's phase function, -1..1
 uniform float uSurface;  // 0..1: how readily a gradient makes a surface
 uniform vec4 uContrast;  // factor to the gradients of each channel
-uniform float uShine;  // 0..1: reflection of a surface seen straight on, in 8 % of it
-uniform float uGloss;  // exponent of its lobe
-uniform float uOcclusionReach;  // um
+uniform float uShine;  // 0..1: reflectance of a surface that is seen straight on; 1 means 8 %
+uniform float uGloss;  // exponent of the lobe in which a shiny surface reflects; larger is sharper
+uniform float uOcclusionReach;  // um: largest distance at which matter darkens a point
 uniform float uMostLight;  // largest radiance of one path, because rare bright paths would sparkle for long
 
 uniform uint uSample;
 uniform int uHistory;  // samples of earlier frames: 0: unusable; 1: of this view; 2: of a view slightly beside it
 uniform mat4 uToBefore;  // from the box to the device coordinates of the last frame
 uniform vec3 uEyeBefore;
-uniform float uMostHistory;  // largest number of samples that are kept from such a view
+// Largest number of samples that are kept from a view slightly beside the current one.
+uniform float uMostHistory;
 uniform sampler2D uSums;  // premultiplied colour and coverage, summed
 uniform sampler2D uMoments;  // summed: squared luminance, samples, distance, openness
 uniform sampler2D uNoisiness;  // standard error of the mean luminance of each tile of NOISE_TILE pixels
-uniform vec2 uTurn;  // the tiles that are sampled in this frame: from x on, a share of y
+uniform vec2 uTurn;  // random numbers of the tiles that this pass samples: x .. x + y, modulo 1
 uniform float uCalm;  // standard error below which a tile is sampled less often; 0: all tiles always are
 
 // The chunks use these as the box around all tiles. Here it is the box of the paths.

@@ -4,11 +4,12 @@ precision highp float;
 
 uniform sampler2D uColor;  // linear, premultiplied
 uniform sampler2D uGuide;  // distance in lengths of the box's longest edge; 0: the pixel shows nothing
-uniform float uEdge;  // um
+uniform float uEdge;  // um: longest edge of the box
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
 uniform mat4 uToBox;  // the current view: from normalised device coordinates to um of the box
 uniform vec3 uEyeAt;
-uniform mat4 uFromBox;  // the view from which the paths began
+// from um of the box to device coordinates of the view in which the paths began
+uniform mat4 uFromBox;
 uniform vec3 uEyeThere;
 uniform float uAway;  // um, distance to the centre of the box
 

@@ -4,14 +4,14 @@
 precision highp float;
 
 uniform sampler2D uColor;  // linear, premultiplied
-uniform float uExposure;  // factor
-uniform float uSharpness;  // 0: no sharpening
+uniform float uExposure;  // factor to the light before the tone map
+uniform float uSharpness;  // strength of the sharpening; 0: none
 uniform bool uIsFilmic;
 uniform vec3 uTone;  // turns of hue, factor to saturation, added lightness
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
-uniform sampler2D uGuide;  // samples
+uniform sampler2D uGuide;  // y: number of samples of a pixel
 uniform sampler2D uMarched;  // linear, premultiplied
-uniform float uRounds;  // samples that every pixel has
+uniform float uRounds;  // number of samples that every pixel has at least
 uniform vec4 uMarchedPart;  // the eye's part of uMarched; width 0: nothing stands in
 
 out vec4 oColor;  // encoded, premultiplied

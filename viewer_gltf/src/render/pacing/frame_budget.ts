@@ -19,7 +19,7 @@ const RATE_HZ = 60;
 const LATE = 1.3;
 
 export class FrameBudget {
-  /** Time between the last two frames, smoothed. */
+  /** Smoothed time between two frames, ms. */
   frame_ms = 0;
   /** Whether the frames of a moving view come later than the display could show them. */
   isLate = false;

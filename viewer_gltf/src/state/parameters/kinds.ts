@@ -19,12 +19,12 @@ type Row<On, T extends Value> = Readonly<{
   name?: (on: On) => string;
   /** Name in a link; absent: no link has the parameter. */
   link?: string;
-  /** Reason why the panel cannot set it now; "": it can. */
+  /** Reason why the panel cannot set the parameter now; "": it can. */
   refusal?: (on: On) => string;
   /** Explanation in one sentence, where the label does not say it. */
   about?: string;
   get: (on: On) => T;
-  /** The announcement after a key has set it. */
+  /** The announcement after a key has set the parameter. */
   spoken: (on: On) => string;
 }> & {
   /** @param value a value that `accepted` returns */
@@ -37,7 +37,7 @@ export type NumberParameter<On> = Row<On, number> &
     limits: readonly [number, number];
     /** Number of steps from one end of the slider to the other. */
     steps: number;
-    /** Whether equal steps are equal factors. */
+    /** Whether equal movements of the slider multiply the value by equal factors. */
     isLogarithmic?: boolean;
     /** Rounds a slider's value to the digits that a step needs. More digits would lengthen a link. */
     rounded: (value: number) => number;
@@ -59,7 +59,7 @@ export type ChoiceParameter<On, T extends string = string> = Row<On, T> & {
   readonly options?: (on: On) => readonly T[];
   /** Whether the choices open as a list, because their names are long. Other choices stand side by side. */
   readonly isListed?: boolean;
-  /** Key that chooses the next value. */
+  /** Key of the keyboard that sets the next of the values. */
   readonly key?: KeyWords;
   /** A value that depends on the user's own file: no link has it, and no key leads to it. */
   readonly ownValue?: T;
@@ -122,7 +122,7 @@ export function withValue<On>(row: Parameter<On>, on: On, value: Value): On {
   return (row.set as (on: On, value: Value) => On)(on, next);
 }
 
-/** Returns the place of a value between the limits, 0..1. */
+/** Returns the position of a value between the smallest and the largest one, 0..1, for a slider. */
 export function shareOf<On>(
   { limits: [low, high], isLogarithmic }: NumberParameter<On>,
   value: number,

@@ -35,7 +35,7 @@ export type TileMatter = Readonly<{
   channels: readonly Readonly<{ texels: Uint8Array; opacities: Uint8Array }>[];
   /** Texels along x, y, z. */
   size: Size3;
-  /** Size of the finest level in texels of this level; the last texel may extend beyond it. */
+  /** Size of the finest mip level, in texels of this level; the last texel may extend beyond it. */
   whole: Vec3;
   /** The tile's box in the texture, 0 to 1. */
   low: Vec3;

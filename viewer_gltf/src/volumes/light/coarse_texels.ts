@@ -20,7 +20,7 @@ export class CoarseTexels {
     return this.underWay > 0;
   }
 
-  /** The texels of a loaded level; null until `onChange` is called, or if decoding fails. */
+  /** The texels of a loaded mip level; null until `onChange` is called, or if decoding fails. */
   get(source: VolumeSource, level: number): Uint8Array | null {
     const kept = this.kept.get(source);
     if (kept?.level === level) return kept.texels;
@@ -43,7 +43,7 @@ export class CoarseTexels {
       entry.texels = await decodeTexels([{ bytes, name }], texels(levels[entry.level]));
     } catch (error) {
       if (!(error instanceof DecodeError)) throw error;
-      this.onError(error); // the level was drawn before, so it is not damaged
+      this.onError(error); // the file is not damaged, because this mip level was drawn before
     } finally {
       this.underWay--;
     }

@@ -29,9 +29,11 @@ import { type Cut, type Grid, gridRound, type TileMatter } from "./coarse_matter
 import type { CoarseTexels } from "./coarse_texels";
 import { type Shading, ShadingClient } from "./shading_client";
 
-/** Largest number of texels in the coarse levels of all volumes together. */
+/** Largest number of texels in the coarse mip levels of all volumes together. */
 const MAX_TEXELS = 2 ** 23;
-/** Radius of the occlusion in coarsest voxel spacings; the same as for meshes. */
+/**
+ * Radius of the ambient occlusion, in voxel spacings of the coarsest axis; the same as for meshes.
+ */
 const REACH_VOXELS = 8;
 /** Steps of the lamp's direction from the middle of a cube's face to its edge: 2 degrees each. */
 const LAMP_STEPS = 24;

@@ -142,7 +142,7 @@ export function lampLight(through: Float32Array, size: Size3, towards: Vec3): Fl
   const along = [0, 1, 2].reduce((a, b) => (Math.abs(towards[b]) > Math.abs(towards[a]) ? b : a));
   const [p, q] = [0, 1, 2].filter((axis) => axis !== along);
   const [np, nq, planes] = [size[p], size[q], size[along]];
-  const forward = towards[along] > 0; // then the last plane is lit first
+  const forward = towards[along] > 0; // if true, the last plane is the nearest one to the lamp
   // where the way to the lamp crosses the previous plane, in cells to the side
   const length = 1 / Math.abs(towards[along]);
   const [aside, up] = [towards[p] * length, towards[q] * length];

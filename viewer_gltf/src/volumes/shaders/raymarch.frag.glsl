@@ -8,23 +8,24 @@ precision highp sampler3D;
 precision highp sampler2DArray;
 precision highp usampler3D;
 
-uniform vec3 uSize;  // um
+uniform vec3 uSize;  // um: edges of the tile's box
 uniform vec3 uTexLow;  // texture coordinates at the box's low corner
 uniform vec3 uTexHigh;  // texture coordinates at the box's high corner
-uniform vec3 uTexels;  // texels of mip level 0
+uniform vec3 uTexels;  // number of texels of mip level 0 along x, y, z
 uniform float uVoxel;  // um: length of path for which the opacities of the transfer functions hold
-uniform float uDensity;  // factor of uVoxel
-uniform float uMinStep;  // um
+uniform float uDensity;  // factor to the optical depth of all matter
+uniform float uMinStep;  // um: shortest step along a ray
 uniform vec4 uFloor;  // for each channel: intensities up to this are invisible
 uniform vec4 uContrast;  // for each channel: factor of the gradients used for shading
 #ifdef MAXIMUM
-uniform vec4 uWindowLow;  // for each channel: intensity that is dark
-uniform vec4 uWindowHigh;  // for each channel: intensity that is bright
+uniform vec4 uWindowLow;  // for each channel: intensity that is shown dark, 0 to 1
+uniform vec4 uWindowHigh;  // for each channel: intensity that is shown bright, 0 to 1
 #endif
-uniform int uSteps;  // for the whole ray, at most MAX_STEPS
+uniform int uSteps;  // steps of a ray through all tiles, at most MAX_STEPS
 uniform int uSpare;  // steps reserved for the other tiles, one each
 uniform vec3 uAllLow;  // um, the same space: low corner of the box around all marched tiles
-uniform vec3 uAllHigh;  // high corner; these tiles share the ray's steps by length
+// High corner of that box; each tile gets steps by its share of the ray's length.
+uniform vec3 uAllHigh;
 uniform float uBrickSlack;  // bricks by which a coarse mip level spreads beyond its brick
 uniform vec3 uColor[CHANNELS];  // linear RGB
 #ifdef DISC
@@ -38,33 +39,34 @@ uniform float uReach;
 uniform bool uIsCrossing;  // whether all marched channels are shown only in the disc
 #endif
 uniform float uPresence;  // 0 to 1: volumes fade in when they are loaded
-uniform vec3 uClipLow;  // um: nothing outside is drawn
+uniform vec3 uClipLow;  // um: low corner of the clip box; nothing outside the box is drawn
 uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;  // xyz unit normal, w um: points with dot(normal, p) > w are not drawn
-uniform vec4 uCorner[3];  // points for which this holds for all three planes are not drawn
+uniform vec4 uCorner[3];  // three planes like uClipPlane; points beyond all three are not drawn
 uniform sampler3D uVolume;
-uniform usampler3D uIndex;  // with STREAM_BRICK
-uniform sampler3D uOldVolume;  // the volume before, at another mip level
-uniform float uFresh;  // share of the new volume, 0 to 1
+uniform usampler3D uIndex;  // only with STREAM_BRICK: slot and level of each cell's brick
+uniform sampler3D uOldVolume;  // the volume that uVolume replaces, at another mip level
+uniform float uFresh;  // weight of uVolume while it fades in over uOldVolume, 0 to 1
 uniform sampler3D uOccupancy;  // distance to the nearest visible brick, in bricks / 255
 uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor of the colour, A opacity per voxel
 #ifdef TWO_D
-uniform sampler2DArray uTables2d;  // 256 x 64 x CHANNELS: the same by intensity and steepness
+// 256 x 64 x CHANNELS: RGB factor and opacity by intensity and gradient.
+uniform sampler2DArray uTables2d;
 #endif
 uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;
 uniform bool uHasPane;  // whether any surface is translucent
 uniform vec3 uKeyLight;  // light that a white surface reflects when it faces the key light
-uniform vec3 uFillLight;  // the same for the fill light
-uniform vec3 uSkyLight;  // the same for the sky
-uniform vec3 uGroundLight;  // the same for the ground
+uniform vec3 uFillLight;  // light that a white surface reflects when it faces the fill light
+uniform vec3 uSkyLight;  // light that a white surface reflects when it faces the sky
+uniform vec3 uGroundLight;  // light that a white surface reflects when it faces the ground
 uniform float uGloss;  // largest share of the key light in a highlight
 // Light that reaches each cell around all volumes: x from all around, y from the lamp.
 uniform sampler3D uReached;
 uniform mat4 uToShading;  // from the box, um, to its texture coordinates
-uniform float uShadingCell;  // um
+uniform float uShadingCell;  // um: edge of a cell of uReached
 uniform float uDepthShading;  // strength of the shading, 0 to 1
-uniform sampler2D uNoise;  // blue noise
+uniform sampler2D uNoise;  // a tile of blue noise, which shifts the samples of each ray
 uniform float uPhase;  // shift of the noise in this frame, 0 to 1
 uniform vec4 uEye;  // the eye's part of the frame: x, y, width, height, pixels
 uniform vec4 uPart;  // the eye's part of the image that is drawn here, which may have fewer pixels
@@ -169,10 +171,11 @@ void main() {
   brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
   vec3 invBrickDir = 1.0 / brickDir;
 #ifdef MAXIMUM
-  vec4 largest = vec4(0.0);  // intensities
+  vec4 largest = vec4(0.0);  // largest intensity of each channel along the ray
 #endif
   vec4 sum = vec4(0.0);
-  vec4 veil = vec4(0.0);  // the sum up to the edge, where the scene lies at the pixel's centre
+  // The sum up to `edge`, where opaque surfaces at the pixel's centre end the ray.
+  vec4 veil = vec4(0.0);
   float pane = uHasPane ? paneDistance(back) - span.x : NOWHERE;
   vec4 front = vec4(0.0);  // the sum in front of the pane
   bool isBehind = false;
@@ -190,18 +193,20 @@ void main() {
 #else
   const float FULL = OPAQUE;
 #endif
-  // The loop runs in legs: to the pane, to the edge and to the end, so that samples need not test
-  // what they pass.
-  bool isPast = false;  // whether the edge is passed
+  // The loop runs in three legs, which end at the pane, at `edge` and at `end`. Samples therefore
+  // need not test what they have passed.
+  bool isPast = false;  // whether the ray has passed `edge`
   for (int leg = 0; leg < 3; leg++) {
     float stop = min(isPast ? end : edge, pane);
     for (; i < steps && t < stop && sum.a < FULL; i++) {
-      // The rest of the ray divided by the rest of the budget, so that it always reaches the end.
+      // The rest of the ray is divided by the number of steps that are left, so that the ray always
+      // reaches its end.
       float dt = max(uMinStep, (end - t) / float(steps - i));
-      // A separate loop, so that neighbouring rays sample together, however much they skipped.
+      // Skipping has a separate loop, so that neighbouring rays sample together, however much they
+      // skipped.
       while (t >= exit) {
         vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
-        // By whole steps, so that samples lie where they would lie without skipping.
+        // The ray skips whole steps, so that samples lie where they would lie without skipping.
         float skip = block.y * floor((block.x - t) / dt) * dt;
         exit = skip > 0.0 ? t + skip : block.x;
         if (skip <= 0.0) break;

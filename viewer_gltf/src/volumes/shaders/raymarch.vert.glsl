@@ -3,8 +3,8 @@
 uniform vec3 uSize;  // um, edges of the box
 
 centroid out vec3 vPosition;  // um, from the box's low corner
-flat out vec3 vEye;  // um, the same space
-flat out vec3 vLight;  // unit vector towards the lamp, the same space
+flat out vec3 vEye;  // um, from the box's low corner: the eye
+flat out vec3 vLight;  // unit vector towards the lamp, in the axes of the box
 flat out vec3 vFill;  // unit vector towards the fill light
 flat out vec3 vUp;  // unit vector towards the sky
 flat out vec2 vDepth;  // third row of the projection: clip z = x * view z + y

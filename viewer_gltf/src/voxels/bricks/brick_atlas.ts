@@ -25,7 +25,9 @@ const MAX_SLOTS = 254;
  * again.
  */
 const SHOW_EVERY_MS = 250;
-/** Level that marks a cell with one uniform value. */
+/**
+ * Number that stands in the index in place of a resolution level if all voxels of a cell are equal.
+ */
 const UNIFORM = 255;
 
 type Tree = {
@@ -49,7 +51,10 @@ export class BrickTile {
   private index: Data3DTexture | null = null;
   private side: readonly [number, number, number] = [0, 0, 0];
   private used = 0;
-  /** Nodes of this level and coarser ones fit in the atlas. */
+  /**
+   * Finest resolution level whose bricks, together with all coarser ones, fit in the atlas; 0 is
+   * full resolution.
+   */
   private finest = 0;
   private isStale = false;
   private shown_ms = 0;
@@ -85,20 +90,20 @@ export class BrickTile {
   }
 
   hasFailed(): boolean {
-    return false; // tiles are refused as a whole
+    return false; // a host refuses a whole tile, and never a single channel
   }
 
   retryFailed(): void {}
 
   /**
-   * For each channel: data that was left out is invisible if nothing up to this intensity is
-   * visible.
+   * For each channel, an intensity, 0 to 255, or -1. The host leaves out bricks whose voxels are
+   * all at or below it. A transfer function that shows such voxels therefore needs other bricks.
    */
   get thresholds(): readonly number[] {
     return [...this.trees.values()].map(({ table }) => table?.threshold ?? -1);
   }
 
-  /** Wants these volumes; their levels are streamed by view. */
+  /** Starts to stream the bricks of these volumes, as the camera's view needs them. */
   want(
     sources: ReadonlyMap<string, VolumeSource>,
     _levels?: readonly number[],
@@ -143,7 +148,8 @@ export class BrickTile {
     const tree = this.treeOf(id, receiver);
     if (tree === null) return;
     if (tree.table !== null) {
-      // after a reconnection: the same volume is complete here, of another one nothing is
+      // A table that arrives after a reconnection changes nothing if it is of the same volume. If
+      // it is of another volume, the loaded bricks are useless.
       if (tree.table.nodes[0]?.hash !== table.nodes[0]?.hash) this.onRefused();
       return;
     }
@@ -245,7 +251,8 @@ export class BrickTile {
       }
       bricks.push(rangesOf(table, drawn, brickCounts(table.size)));
     }
-    if (!isWhole) return; // the root of each channel comes first and soon
+    // until the coarsest brick of each channel has arrived, the last content stays on screen
+    if (!isWhole) return;
     index.needsUpdate = true;
     const finest = Number.isFinite(level) ? level : 0;
     this.shown = { channels: ids, level: finest, texture: atlas, bricks, index };

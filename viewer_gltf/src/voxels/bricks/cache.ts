@@ -58,7 +58,8 @@ export class BrickCache {
       };
       return new BrickCache(await resultOf(request));
     } catch {
-      return new BrickCache(null); // a private window, or a browser that forbids it
+      // there is no database in a private window, or if the browser forbids storage
+      return new BrickCache(null);
     }
   }
 
@@ -128,7 +129,10 @@ export class BrickCache {
     await finished(work);
   }
 
-  /** Runs a task; a database that is full or was removed counts as none. */
+  /**
+   * Runs a task on the database. Returns `none` if there is no database, or if it is full or was
+   * removed.
+   */
   private async safely<T>(none: T, work: (database: IDBDatabase) => Promise<T>): Promise<T> {
     if (this.database === null) return none;
     try {

@@ -17,7 +17,7 @@ export type LinkMessage =
       tile: string;
       channel: string;
       nodes: Uint32Array<ArrayBuffer>;
-      /** 18^3 bytes for each node. */
+      /** Texels of the bricks, one after another: 18^3 bytes for each node. */
       texels: Uint8Array<ArrayBuffer>;
     }>
   | Readonly<{ type: "done" }>
@@ -37,7 +37,7 @@ export type BrickReceiver = Readonly<{
   onRefused: (text: string) => void;
 }>;
 
-/** Milliseconds between two requests of a view, at least. */
+/** Least time, in milliseconds, between two requests for the bricks of a view. */
 const VIEW_EVERY_MS = 200;
 /** Bytes of bricks for one view, at most; bricks with the largest error come first. */
 const BUDGET_BYTES = 64 * 1024 * 1024;
@@ -69,7 +69,7 @@ export class BrickLink {
   open(tile: string, channel: string, source: string, receiver: BrickReceiver): void {
     this.receivers.set(`${tile}/${channel}`, receiver);
     this.isBusy = !this.isAway;
-    this.last = ""; // so the same view requests more bricks
+    this.last = ""; // makes the next `look` request bricks, even if the view has not changed
     this.post({ type: "open", tile, channel, source });
   }
 
@@ -80,7 +80,7 @@ export class BrickLink {
     this.post({ type: "close", tile, channel });
   }
 
-  /** Sets the current view. Call it in every frame. */
+  /** Requests the bricks that the camera's present view needs. Call it in every frame. */
   look(view: BrickView, now_ms: number): void {
     if (
       !this.isOpen ||
@@ -138,7 +138,7 @@ export class BrickLink {
     else this.isOpen = true;
     if (isAway === this.isAway) return;
     this.isAway = isAway;
-    this.last = ""; // so the same view is requested again
+    this.last = ""; // makes the next `look` request bricks, even if the view has not changed
     noteWait(isAway);
     this.onDone();
   }

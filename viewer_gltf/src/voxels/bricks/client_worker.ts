@@ -127,7 +127,8 @@ async function handleText(message: ServerMessage): Promise<void> {
     for (const tree of trees.values()) await flush(tree);
     if (message.view !== viewId || message.reason === "cancelled") return;
     if (message.reason === "budget")
-      requestView(); // the same view continues
+      // the view needs more bricks than one answer may hold, so the rest is requested
+      requestView();
     else if (readyTrees().length >= volumes.size) post({ type: "done" });
   }
 }

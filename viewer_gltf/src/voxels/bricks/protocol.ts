@@ -11,7 +11,7 @@ export const TEXEL_PX = 1;
 
 /** The camera in the world, um. */
 export type BrickView = Readonly<{
-  /** Projection x view, column-major. */
+  /** Matrix from um of the world to the camera's clip space, column-major. */
   clip: readonly number[];
   eye: readonly [number, number, number];
   gaze: readonly [number, number, number];

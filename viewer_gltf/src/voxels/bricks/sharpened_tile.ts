@@ -62,8 +62,8 @@ export class SharpenedTile {
   }
 
   /**
-   * For each channel: data that was left out is invisible if nothing up to this intensity is
-   * visible.
+   * For each channel, an intensity, 0 to 255, or -1. The host leaves out bricks whose voxels are
+   * all at or below it. A transfer function that shows such voxels therefore needs other bricks.
    */
   get thresholds(): readonly number[] {
     return this.isSharp ? (this.finer?.thresholds ?? []) : [];
@@ -78,8 +78,8 @@ export class SharpenedTile {
   }
 
   /**
-   * Loads these channels and levels of the coarse volumes. If the channels changed, no finer volume
-   * is loaded yet.
+   * Loads these channels and mip levels of the coarse volumes. If the channels changed, no finer
+   * volume is loaded yet.
    */
   want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
     const names = [...sources.keys()];

@@ -20,7 +20,7 @@ const EMPTY = 1;
 type Node = Readonly<{
   level: number;
   isEmpty: boolean;
-  /** Value of an empty node everywhere. */
+  /** The value, 0..255, that all voxels of an empty node have. */
   constant: number;
   at: Size3;
   /** Range of all values that are sampled in the node's box, from its brick or from finer ones. */

@@ -56,7 +56,8 @@ export function screenOf(width: number, height: number, perInch: number): Screen
 export function undistort(k: readonly number[], r: number): number {
   let low = 0;
   let high = r;
-  while (distort(k, high) < r && high < 100) high *= 1.5; // lenses that make the image smaller
+  // needed for lenses that make the image smaller, where the result exceeds r
+  while (distort(k, high) < r && high < 100) high *= 1.5;
   for (let i = 0; i < 54; i++) {
     const middle = (low + high) / 2;
     if (distort(k, middle) < r) low = middle;

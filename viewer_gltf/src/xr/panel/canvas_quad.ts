@@ -21,7 +21,8 @@ import { paint } from "../../panel/canvas/paint";
 
 const LIT = 0xffffff;
 /**
- * Opacity of the light on a target. Light is blended linearly, so 0.04 looks like a fifth of white.
+ * Opacity of the light on the control that is pointed at. Light is blended linearly, so 0.04 looks
+ * like a fifth of white.
  */
 const LIT_OPACITY = 0.04;
 /** Metres between the quad and the light in front of it. */

@@ -187,7 +187,7 @@ export class HeadsetPanel {
    * width.
    */
   get places(): readonly PlacedTarget[] {
-    if (!this.group.visible) return []; // a flat screen
+    if (!this.group.visible) return []; // the panel is not shown on a flat screen
     return [...(this.isOpen ? this.menu.places : []), ...this.bar.places];
   }
 

@@ -20,7 +20,10 @@ export class PanelPages {
     this.go(START_CANVAS);
   }
 
-  /** Advances the colours beside a swatch. Returns whether others are shown now. */
+  /**
+   * Advances the time for which a swatch is gazed at. Returns whether the colours of another
+   * channel are shown now.
+   */
   advance(dt_s: number): boolean {
     const fanned = this.fan.advance(dt_s, this.shown.fanned);
     if (fanned === this.shown.fanned) return false;

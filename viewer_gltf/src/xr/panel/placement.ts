@@ -27,7 +27,7 @@ type Places = Readonly<{
    * still.
    */
   waits: readonly [number, number];
-  /** Metres from the eye to both. */
+  /** Metres from the eye to the panel, and to the bar. */
   distance_m: number;
 }>;
 
@@ -125,7 +125,7 @@ export function headBearing(head: Matrix4): Bearing {
   return bearingOf(new Vector3(0, 0, -1).transformDirection(head));
 }
 
-/** The same angle within -pi to pi. */
+/** Returns an equivalent angle, radians, within -pi to pi. */
 function wrapped(angle: number): number {
   return Math.atan2(Math.sin(angle), Math.cos(angle));
 }
