@@ -1,4 +1,4 @@
-"""Write the files that a channel has once in a bundle, and the manifest's entries."""
+"""Write the files that a channel has once for all tiles of a bundle, and the manifest's entries."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -74,7 +74,7 @@ def _describe_view(view: StageView) -> dict[str, Any]:
 def write_channel(
     root: Path, appearance: ComposedAppearance, tiles: Sequence[tuple[str, TileChannel]]
 ) -> tuple[dict[str, Any], list[FileRef]]:
-    """Write the files that a channel has once; return its entry in the manifest, and the files."""
+    """Write a channel's files that cover all tiles; return its manifest entry, and the files."""
     folder = f"channels/{appearance.id}"
     drawn = [channel.lods for _, channel in tiles if channel.lods]
     tilesets = [

@@ -68,7 +68,7 @@ class TileChannel:
     joint      joint histogram of the volume, packed, see bundle/write_transfer2d.py; None: no
                volume
     edit       message about edits of the surface by hand; empty: none
-    objects    objects of a label map; None: none
+    objects    objects of a label map; None: the channel is no label map, or has no surface here
     """
 
     __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")

@@ -1,8 +1,8 @@
 """Read the voxels of a composed volume as 8 bits, with the window of the composed stage applied.
 
 An edited window is applied to the voxels as measured, if the stage has them. The result is exactly
-that of a build with this window. Without them, the 8-bit voxels of the build are rescaled, so their
-steps remain visible.
+that of a build with this window. Without the measured voxels, the 8-bit voxels of the build are
+rescaled, so the jumps between neighbouring brightness values may become visible.
 """
 
 import numpy as np

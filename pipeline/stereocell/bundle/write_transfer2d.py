@@ -22,7 +22,7 @@ from stereocell.model.world_box import WorldPoint
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
 from stereocell.usd.composed_appearance import ComposedAppearance
 
-COUNTED_VOXELS = 4_000_000  # voxels of a tile; in a larger tile, planes are skipped
+COUNTED_VOXELS = 4_000_000  # voxels of a tile that are counted; slices of a larger one are skipped
 _STORED = np.dtype("<u4")
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from stereocell.meshes.validity import border
 
 Plane = tuple[int, float]  # axis of the plane's normal (0: x), and the plane's coordinate
-_NEAR = 1e-4  # largest distance of a vertex from its plane, as a share of the surface's size
+_NEAR = 1e-4  # largest distance of a vertex from its plane, as a share of the box's longest edge
 
 
 def close_cuts(

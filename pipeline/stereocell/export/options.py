@@ -30,9 +30,9 @@ class ExportOptions:
     units          unit of the numbers in formats that do not state one
     scale          length in the file / length of the specimen
     compress       `meshopt` or `draco`
-    components     whether a .3mf has one object per body, joined by components
+    components     whether a .3mf has one mesh per body, joined by 3MF components
     occlusion      whether vertices are darkened by ambient occlusion
-    bits           bits per voxel
+    bits           bits per voxel, 8 or 16
     unity          whether to write one channel for UnityVolumeRendering's importers
     wall_mm        mm in print; thinner parts are reported
     width          width of an image or a video, in pixels

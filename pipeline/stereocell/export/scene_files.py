@@ -44,7 +44,11 @@ def pack(path: str, data: bytes) -> Packed:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """The finest levels that are kept, 0: all levels. A tile always keeps its coarsest level."""
+    """The finest levels that are kept, 0: all levels. A tile always keeps its coarsest level.
+
+    surfaces  level of detail
+    volumes   mip level
+    """
 
     surfaces: int
     volumes: int

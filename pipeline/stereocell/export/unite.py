@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from stereocell.meshes.validity import border
 from stereocell.model.errors import StageError
 
-# Smallest length of an edge, as a share of a solid's size. Boolean operations leave shorter edges,
-# which are removed: both ends could be the same position in float32, and other programs would then
-# treat the solid as open.
+# Smallest length of an edge, as a share of the longest edge of a solid's box. Boolean operations
+# leave shorter edges, which are removed: both ends could be the same position in float32, and other
+# programs would then treat the solid as open.
 _HAIR = 1e-5
 # Overlap of neighbouring boxes, and margin to a cut, as a share of the shortest edge of all boxes
 _REACH = 3e-4

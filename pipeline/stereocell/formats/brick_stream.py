@@ -81,11 +81,11 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """The content of a binary frame for one tree.
+    """A piece of a binary frame: bytes of a tree's table, or one brick of a tree.
 
     tree  number of the tree
-    at    first byte in the tree's table, or number of the node
-    data  bytes of the table, or a brick's zstd frame
+    at    table: position of the first of these bytes in it; brick: number of its node
+    data  bytes of the table, or the brick's zstd frame
     """
 
     tree: int
@@ -99,7 +99,7 @@ class Frame:
 
     kind      TABLE_FRAME or BRICKS_FRAME
     sequence  number of the frame
-    view      id of the view whose bricks the frame holds; 0 for tables
+    view      ID that the client gave the view whose bricks the frame holds; 0 for tables
     parts     content, one part after the other
     """
 
@@ -110,7 +110,7 @@ class Frame:
 
 
 def content_hash(data: bytes) -> bytes:
-    """Return the first 128 bits of SHA-256."""
+    """Return the first 128 bits of the SHA-256 of `data`."""
     return hashlib.sha256(data).digest()[:HASH_BYTES]
 
 

@@ -24,7 +24,7 @@ def surfaces(tile: Tile) -> Iterator[tuple[str, int]]:
 
 
 def inlined(tile: Tile, read: Callable[[str], Tile], below: str = "") -> Tile:
-    """Return a tile with the tilesets that it names in place of their names.
+    """Return a tile in which each reference to a nested tileset is replaced by that tileset's root.
 
     read  returns the root of the tileset at an address
     """

@@ -39,7 +39,9 @@ class VdbGrid:
     spacing  float64 (3,), distance between voxels along x, y, z, in the file's units
     origin   float64 (3,), centre of voxel (0, 0, 0), x, y, z, in the file's units
     tree     type of the tree
-    start    byte at which the grid begins, after its descriptor; `blocks`: its leaves; `end`
+    start    position of the grid's first byte, after its descriptor
+    blocks   position of the first byte of its leaves' values
+    end      position after the grid's last byte
     """
 
     name: str

@@ -58,7 +58,7 @@ class UnitFacts:
     directory   folder of its results
     iso_value   voxel value above the background; None: the channel has none
     background  mean of the subtracted background over the tile, voxel values; 0: none
-    confidence  0..1, of this tile alone; None: the tile holds no structure
+    confidence  0..1, of the iso-value in this tile alone; None: the tile holds no structure
     reason      why there is no surface; empty: there is one
     voxels      (x, y, z), size of the stored volume with its apron
     volume_bytes, ktx2_bytes  size of the 8-bit voxels, and of their files in the bundle (0: none)

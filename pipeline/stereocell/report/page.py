@@ -328,7 +328,10 @@ def _in_eight_bits(
 
 
 def _scene(facts: Facts, tile: Tile | None, labels: Sequence[LabelFacts] = ()) -> Scene:
-    """Return the scene of a tile, or of the whole specimen: label maps where there is no image."""
+    """Return the scene of a tile, or of the whole specimen if `tile` is None.
+
+    labels  label maps, which are drawn only if the plan has no image channels
+    """
     tiles = facts.plan.tiles if tile is None else (tile,)
     most = _WHOLE_TRIANGLES if tile is None else _TILE_TRIANGLES
     units = [u for u in facts.units if u.lods and (tile is None or u.tile == tile)]

@@ -43,9 +43,9 @@ _FLAT = (
 _BUILT = "built"  # place of prims that the build wrote and that no reader uses
 
 
-WHOLE = "@specifier"  # name that stands for the prim as a whole
-# Takes a place and a name of `edit_table`, and returns why a file format leaves that out; empty:
-# the format has it
+WHOLE = "@specifier"  # name of an edit that concerns a whole prim, not one of its properties
+# Takes a place and a name of `edit_table`, and returns why a file format leaves out such an edit;
+# empty: the format can hold the edit
 LeftOut = Callable[[str, str], str]
 
 
@@ -57,7 +57,7 @@ class _Fate(Enum):
     """The reason why an opinion is not reported."""
 
     TAKEN = 1  # the bundle takes it over
-    COVERED = 2  # a line about its prim, or about prims below a group, is enough
+    COVERED = 2  # another message reports it: on its prim, or on the prims in its group
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,7 +313,10 @@ class _Finder:
         return ""
 
     def _repeats(self, attribute: Usd.Attribute, spec: Sdf.Spec) -> bool:
-        """Return whether an opinion repeats the value of the build, or else the type's default."""
+        """Return whether an opinion repeats the value of the build, or else the type's default.
+
+        The default counts only if the build states no value.
+        """
         if not attribute or not isinstance(spec, Sdf.AttributeSpec) or not spec.HasDefaultValue():
             return False
         below = [
@@ -341,7 +344,7 @@ def _words_for(prim: Usd.Prim, path: Sdf.Path, name: str) -> str:
 
 
 def _fallback(attribute: Usd.Attribute) -> object:
-    """Return the default that the type of an attribute's prim or shader defines; None: none."""
+    """Return an attribute's default by its prim's or shader's type; None: it has no default."""
     prim, name = attribute.GetPrim(), attribute.GetName()
     if prim.IsA(UsdShade.Shader) and name.startswith("inputs:"):
         node = Sdr.Registry().GetShaderNodeByIdentifier(str(UsdShade.Shader(prim).GetShaderId()))

@@ -53,7 +53,7 @@ def file_of(attribute: Usd.Attribute) -> Path:
 
 
 def color_of(attribute: Usd.Attribute, value: Any = None) -> tuple[float, float, float]:
-    """Return a colour, linear RGB. Raises StageError if it is missing or a part is outside 0..1.
+    """Return a colour, linear RGB. Raises StageError if it is missing or has values outside 0..1.
 
     value  one colour of an attribute that holds an array; None: the attribute holds one colour
     """

@@ -44,7 +44,7 @@ _Types = Sdf.ValueTypeNames
 
 @dataclass(frozen=True, slots=True)
 class MadeMaps:
-    """Baked maps of a level that was computed again after an edit.
+    """Baked maps of a level of detail that was computed again after an edit.
 
     All are uint8: normals (h, w, 3), openness (h, w), sRGB colours (h, w, 3). None: no map.
     """
@@ -63,8 +63,8 @@ class ComposedLod:
     largest_um   largest of these distances, um; equal to `distance_um` in stages of earlier
                  versions, which do not state it
     matrix       (4, 4) for row vectors, from the mesh's own space to world um
-    shape        hash of the composed points and faces; empty if `built` is
-    built        the same hash as the build wrote it; empty: the stage has none
+    shape        hash of the composed points and faces; empty if `built` is empty
+    built        hash of the points and faces that the build wrote; empty: the stage has no hash
     own          the 16 numbers of the transform on the mesh's prim
     lost         values that an edit of the faces made invalid: `maps`, `occlusion`, `colours`
     images       maps in memory, if the level was computed again: see bundle/edited_meshes.py
@@ -166,7 +166,7 @@ def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> Compose
 
 
 def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
-    """Return an edited level's mesh in its own space. Raises StageError if there is none."""
+    """Return the mesh of an edited level in its own space. Raises StageError without a mesh."""
     prim = mesh_at(tile, channel_id, level)
     found = None
     if prim is not None:

@@ -93,7 +93,7 @@ class TileExtent:
 
     @property
     def drawn_box(self) -> NDArray[np.float64]:
-        """The drawn tile's corners (2, 3), (x, y, z) in um: half a voxel outside the centres."""
+        """Corners (2, 3), (x, y, z) in um, half a voxel outside the outermost voxels' centres."""
         half = np.asarray(self.spacing_um) / 2
         return np.array(world_box(self.first_um - half, self.last_um + half))
 

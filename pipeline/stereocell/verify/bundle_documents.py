@@ -137,7 +137,10 @@ def objects_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def check_objects(bundle: Path) -> str:
-    """Check that the files of each objects.json have a value for each row, and its rows exist."""
+    """Check that the files of each objects.json have a value per row, and tiles' rows exist.
+
+    The hashes of the parts of the exact values are checked, too.
+    """
     problems = []
     objects = 0
     for channel in channels_of(bundle):

@@ -37,7 +37,7 @@ _MAP_DIFFERENCE = 1.0  # 0..255, largest mean difference of texels, since encode
 # very thin triangles
 _ODD_SHARE = 0.01
 _TURNED = math.radians(3)  # rad, largest difference of normals: two steps of 8-bit octahedral ones
-_UV_STEP = 1e-4  # share of a map's edge; six steps of 16 bits
+_UV_STEP = 1e-4  # largest difference of a UV coordinate, 0..1; six steps of 16 bits
 _ROUNDED = 1.001  # factor, since errors are rounded up to four digits
 _BOX_M = 2e-9  # m, since boxes are rounded outwards to whole nm
 _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
