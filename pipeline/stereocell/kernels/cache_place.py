@@ -1,6 +1,6 @@
-"""Where compiled kernels are cached, and whether all of them are. Imports do not include numba.
+"""Find the cache of compiled kernels, and whether all kernels are in it, without importing numba.
 
-The place is the first of these that can be written: the folder named by NUMBA_CACHE_DIR,
+The cache is the first of these folders that can be written: the folder named by NUMBA_CACHE_DIR,
 `__pycache__` beside the kernels, or the user's cache. It holds one folder for each module. The
 folder's name is a hash of the module and of the kernels that it imports, because numba does not
 notice that a called function in another file has changed.
@@ -58,7 +58,7 @@ def compile_in_process() -> None:
 
 
 def mark_compiled() -> None:
-    """Record that all kernels are compiled, and remove those of older versions."""
+    """Record that all kernels are compiled, and remove compiled kernels of older versions."""
     home, mark = find_home(), _mark()
     if home is None or mark is None:
         return

@@ -67,16 +67,19 @@ from stereocell.kernels.rings import NEIGHBOURS, Flags, Mesh, Ring, make_mesh, m
 from stereocell.kernels.surface_rings import fill_fans, find_cheapest_in_fan, stamp_fan
 from stereocell.kernels.triangles import Points
 
-PASSES = 4  # largest number of passes over one class of cost; the last class has LAST
+PASSES = 4  # largest number of passes over one class of cost; for the last class, it is LAST
 LAST = 40
-SHARPER = 0.36  # square of .6, the least share of the sharpest angle: 1 - cos grows as its square
+# Square of .6. If triangles around a vertex are sharper than the bound, a collapse may leave .6 of
+# their sharpest angle. The code compares 1 - cos, which grows with the square of an angle.
+SHARPER = 0.36
 BLOCK = 4096  # vertices that are processed together
 
 
 class Limits(NamedTuple):
     """How far a collapse may go."""
 
-    stray: float  # largest distance of a vertex from the result, summed over collapses, in errors
+    # Largest distance of a vertex from the result, summed over collapses; multiple of its error
+    stray: float
     sharpest: float  # cosine of the smallest angle that a triangle may have
     block: int  # vertices that go through all classes of cost before the next ones do
 
@@ -114,7 +117,7 @@ def collapse(
     errors     float64 (n,), largest root of the mean squared distance from the planes; equal for
                all vertices of a connected component
     stray, sharpest  see `Limits`
-    past       int32 (k, 2), collapses of an earlier try with fewer locked vertices; (0, 2) without
+    past       int32 (k, 2), collapses of an earlier try with fewer locked vertices; (0, 2): no try
     caps       uint8 (n,), a bit for each cap that a vertex lies in; None: there are no caps
     result     triangles int32 (m, 3) by the vertices that are left; bool (m,), triangles that are
                left; int32 (k, 2), collapses: a vertex, and the one onto which it has moved
@@ -330,7 +333,7 @@ def find_cost_after(v: int, limit: int, mesh: Mesh, ring: Ring) -> int:
 
 @step
 def price_neighbours(u: int, mesh: Mesh, ring: Ring) -> int:
-    """Write the price of moving u onto each neighbour; return the number of the cheapest.
+    """Write the price of moving u onto each neighbour; return the index of the cheapest neighbour.
 
     The price is infinite where u would leave its line or its cap.
     """
@@ -349,7 +352,7 @@ def price_neighbours(u: int, mesh: Mesh, ring: Ring) -> int:
 
 @step
 def find_cheapest(ring: Ring) -> int:
-    """Return the number of the neighbour with the least price; of equal ones, the first."""
+    """Return the index of the neighbour with the least price; of equal ones, the first."""
     cheapest = 0
     for j in range(1, ring.sizes[NEIGHBOURS]):
         if ring.price[j] < ring.price[cheapest]:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints
 
-WIDTH = 8  # largest number of voxels of a place
+WIDTH = 8  # largest number of voxels that describe a place, see `find_critical`
 
 
 @part

@@ -8,7 +8,8 @@ from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_co
 from stereocell.kernels.union_find import link, number_components
 
 Ints = NDArray[np.int32]
-# No twin: the edge has one triangle; it has several, or two of opposite winding
+# Values in place of a twin. BORDER: the edge has one triangle. CROWDED: it has more than two
+# triangles, or two whose windings do not agree.
 BORDER, CROWDED = -1, -2
 
 

@@ -23,7 +23,9 @@ from stereocell.kernels.triangles import Points
 
 STEPS = 4  # number of steps in which the error grows to its bound, so that flat parts go first
 PASSES = 6  # largest number of passes over one step
-SHARPER = 0.1  # square of the least share of the sharpest angle, since 1 - cos grows as its square
+# Square of .32. If triangles around a vertex are sharper than the bound, a move may leave .32 of
+# their sharpest angle. The code compares 1 - cos, which grows with the square of an angle.
+SHARPER = 0.1
 
 
 @part

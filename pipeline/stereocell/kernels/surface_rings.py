@@ -9,7 +9,7 @@ from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_tw
 from stereocell.kernels.quadrics import price_of
 from stereocell.kernels.rings import MAX_NEIGHBOURS, NEIGHBOURS, STAMP, TRIANGLES, Flags, Mesh, Ring
 
-VALENCE = 24  # largest number of neighbours of two ends together
+VALENCE = 24  # largest number of neighbours that the two ends of an edge have together
 
 
 @kernel

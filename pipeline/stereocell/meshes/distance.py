@@ -13,7 +13,7 @@ from stereocell.model.mesh import Mesh, Spread
 # Percent of the area; a sliver with less than 1 % of it may vanish without notice
 PERCENTILE = 99.0
 VERTICES = 50_000  # largest number of vertices that are measured for the largest distance
-# Larger than the number of points that a mesh is ever asked for
+# Mark of triangles that searches leave out; larger than the number of any point that is looked up
 NEVER = np.int32(np.iinfo(np.int32).max)
 # Um; points this close count as on the surface, because positions are rounded to float32
 ON_UM = 1e-6

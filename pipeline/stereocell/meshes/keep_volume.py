@@ -40,7 +40,8 @@ from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
 STEPS = 4  # number of Newton steps; volume is a cubic function of the distance
-FADE = 1.25  # distance from a cut, in largest moves, from which vertices move by the whole distance
+# Distance from a cut at which vertices make their whole move, as a multiple of the largest move
+FADE = 1.25
 TRIES = 12  # number of tries with shorter moves, after which a body with defects does not move
 SHORTENING = 0.5  # factor on the moves of vertices in defects, in each try
 MIN_WAY = 0.05  # share of the whole move below which a vertex in a defect does not move

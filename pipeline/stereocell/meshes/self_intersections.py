@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from stereocell.kernels.crossings import ERROR_3D, find_candidates, find_maybe_flat, find_spread
 from stereocell.meshes.triangle_grid import find_around, make_grid
 
-# If less than one in FEW triangles is fresh, only the triangles around fresh ones are examined
+# If less than one in FEW triangles is to be checked, only these and the triangles around them are
+# examined
 FEW = 20
 
 Points = NDArray[np.float64]

@@ -86,7 +86,7 @@ class Simplifier:
         self._corners, self._left = mesh.triangles.copy(), np.ones(len(mesh.triangles), bool)
         self._moves = NOTHING
         self._errors = np.zeros(vertices)
-        # Number of locks at each vertex; a vertex with one stays
+        # Number of times that each vertex was locked; a vertex that was locked does not move
         self._tries = np.zeros(vertices, np.int8)
         self._faulty = np.zeros(vertices, bool)  # vertices of the last draft's defects
         self._redone, self._kept = np.zeros((2, self._bodies[1]), bool)
@@ -164,7 +164,7 @@ class Simplifier:
     ) -> NDArray[np.bool_]:
         """Simplify the chosen bodies (b,); return which of all triangles have changed (m,).
 
-        but_around_locks  whether earlier moves are repeated except around newly locked vertices
+        repeats_moves  whether earlier moves are repeated, except around newly locked vertices
         """
         part = self._mesh.triangles[chosen[self._body_of]]
         past = self._moves[chosen[self._bodies[0][self._moves[:, 0]]]]

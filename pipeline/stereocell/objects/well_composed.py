@@ -41,7 +41,7 @@ def make_well_composed(
     """
     labels = np.ascontiguousarray(labels)
     thin = np.zeros(0, np.int32)
-    while True:  # each time without the objects found too thin
+    while True:  # each turn leaves out the objects that were too thin in the turn before
         mended, found = _mend(labels)
         if not len(found):
             return mended, int((mended != labels).sum()), thin
@@ -77,7 +77,7 @@ def _mend(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int3
 def _best_change(
     flat: NDArray[np.int32], place: Sequence[int], around: NDArray[np.int64], changed: set[int]
 ) -> tuple[int, int]:
-    """Return the voxel to change, and its new label."""
+    """Return the voxel to change at a place from `find_critical`, and its new label."""
     own, others = dict.fromkeys(place[:2]), [voxel for voxel in place[2:] if voxel >= 0]
     label = int(flat[place[0]])
     changes = [(voxel, label) for voxel in others]

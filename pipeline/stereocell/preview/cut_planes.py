@@ -132,7 +132,7 @@ def square_pixels(
 
 
 def extent_words(cut: Cut, *, is_patient: bool) -> dict[str, str]:
-    """Return the directions in which `slices`, `rows` and `columns` run: axes or sides."""
+    """Return the directions of `slices`, `rows` and `columns`: axes, or sides of the patient."""
     if not is_patient:
         slices, rows, columns = ("zyx"[axis] for axis in cut.view.order)
         return {"slices": slices, "rows": rows, "columns": columns}

@@ -74,7 +74,7 @@ class _File:
 class _Work:
     """The changes that a run makes at a target.
 
-    there    path -> bytes of each file at the target
+    there    path -> size in bytes, of each file at the target
     before   the entries of the files that an earlier run has uploaded
     changed  paths to upload
     gone     published paths that the bundle no longer has

@@ -32,7 +32,7 @@ class Target(Protocol):
         """The address at which browsers find the files, ending in a slash; None if unknown."""
 
     def sizes(self) -> dict[str, int]:
-        """Return path -> bytes of all files at the target, including files of others."""
+        """Return the bytes that each file at the target has, by path, including files of others."""
 
     def read(self, path: str) -> bytes:
         """Return a file's content."""
@@ -73,7 +73,7 @@ class FolderTarget:
         self.shown = str(folder)
 
     def sizes(self) -> dict[str, int]:
-        """Return path -> bytes of all files below the folder, except git's."""
+        """Return the size in bytes of each file below the folder, by path, except git's."""
         if self.folder.exists() and not self.folder.is_dir():
             raise OutputError(f"{self.folder}: found a file, expected a folder")
         return {
@@ -165,7 +165,7 @@ class StoreTarget:
         )
 
     def sizes(self) -> dict[str, int]:
-        """Return path -> bytes of all objects below the address."""
+        """Return the size in bytes of each object below the address, by path."""
         fs, base = self._storage
         with self._in_one_line(""):
             try:

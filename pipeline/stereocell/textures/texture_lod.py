@@ -33,7 +33,9 @@ class VertexValues:
 
 
 class Texturer:
-    """Gives levels their values. Coarser levels have some of the finest level's vertices.
+    """Gives levels of detail their ambient occlusion and sampled channel, at vertices or as maps.
+
+    The vertices of a coarser level are a part of the finest level's vertices.
 
     options     resolved
     values      at the vertices of the finest level

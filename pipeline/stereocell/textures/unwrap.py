@@ -12,8 +12,8 @@ only for the coarsest level.
 
 On six of the demo's units, lod1 to lod3, charts cover 15 to 38 % of the texels: they are small, and
 padding takes much of the rest. With 3 texels of padding (only mip level 0) they cover 25 to 41 %.
-With texels of a quarter, 6 to 13 times as many, they cover 38 to 55 %. Packing by brute force adds
-up to 4 %, and a larger `max_cost` of charts hardly anything.
+With texels a quarter as wide, 6 to 13 times as many, they cover 38 to 55 %. Packing by brute force
+adds up to 4 %, and a larger `max_cost` of charts hardly anything.
 """
 
 import atexit

@@ -32,7 +32,7 @@ ERODED_UM = 4500.0  # um; erosion that separates the brain from scalp, optic ner
 GYRI_UM = 3000.0  # um; bright tissue within this distance of the hull belongs to the brain
 RIM_UM = 12000.0  # um; largest distance of the fluid from the hull
 CALM = 0.3  # share of the dark voxels, of lowest gradient, in which bone and fluid are compared
-PARTED = 0.85  # least separability of two kinds, 0..1; an even distribution has .75
+PARTED = 0.85  # least separability of bone and fluid, 0..1; an even distribution has .75
 
 
 def find_foreground(smooth: NDArray[np.float32]) -> Mask:

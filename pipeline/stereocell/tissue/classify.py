@@ -50,7 +50,7 @@ class TissueOptions:
     blur_voxels: float = 0.5
     smoothing_voxels: float = 0.8  # sigma in finest spacings, for both features
     prior: float = 0.6  # strength of the Potts prior
-    prior_rounds: int = 5  # rounds of its mean field
+    prior_rounds: int = 5  # rounds of the Potts prior's mean field
 
 
 @dataclass(frozen=True, slots=True)

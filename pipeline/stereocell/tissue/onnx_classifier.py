@@ -67,7 +67,7 @@ class Network:
         }
 
     def key_content(self) -> dict[str, Any]:
-        """Return the content that counts in a key."""
+        """Return the settings, by which `engine.step` decides whether a result is still valid."""
         return self.settings()
 
     @classmethod

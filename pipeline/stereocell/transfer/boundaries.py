@@ -55,12 +55,12 @@ class Boundary:
     """A boundary between two materials.
 
     low, high  values of the materials, 0..1 in the window
-    apex       steepest gradient along an axis across the edge, 0..1 of the scale's end; it may
-               exceed 1 a little
-    steepest   steepest gradient in the direction for which it is largest
+    apex       steepest gradient of an edge that is perpendicular to an axis, as a share of
+               `gradient_max`; it may exceed 1 a little
+    steepest   steepest gradient over all directions of the edge, as a share of `gradient_max`
     blur       sigma of the edge, in finest voxels
     share      share of all voxels that lie above the noise and that it explains
-    noise      gradient magnitude that noise may have at the middle value, 0..1 of the scale's end
+    noise      gradient that noise may have at the middle value, as a share of `gradient_max`
     sigma      standard deviation of the values' noise there
     """
 

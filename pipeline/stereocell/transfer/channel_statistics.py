@@ -36,7 +36,7 @@ from stereocell.transfer.shapes2d import fall_back
 
 BINS = 256
 BRIGHT_SHARE = 0.95  # share of an MR's tissue that is darker than the lightest grey
-_AT_ONCE = 1 << 20  # voxels
+_AT_ONCE = 1 << 20  # number of voxels that are counted together
 NO_SUGGESTION = SuggestedShapes(TransferFunctions2d(), "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 
@@ -47,7 +47,7 @@ class ChannelStatistics:
 
     window      lowest and highest voxel value
     histogram   voxel counts in 256 bins of the window
-    background  that is subtracted; None: none is
+    background  values that a build subtracts from the voxels; None: it subtracts none
     suggested   2D function for the channel
     values      counts from which the threshold is found
     """
@@ -74,7 +74,7 @@ def find_statistics(
 
     voxels      any shape, any number type, voxel values; they are reordered in place, because the
                 peak memory of a small build would be a sorted copy
-    background  that is subtracted; None: none is
+    background  values that a build subtracts from the voxels; None: it subtracts none
     window      lowest and highest voxel value if known; None: they are found
 
     >>> z, y, x = np.ogrid[-16:16, -16:16, -16:16]

@@ -95,11 +95,11 @@ def find_peaks(curve: NDArray[np.float64]) -> list[int]:
 
 
 def bases_of(curve: NDArray[np.float64], peak: int) -> tuple[int, int]:
-    """Return the lowest places on both sides of a peak, up to where the curve exceeds it.
+    """Return the lowest columns on both sides of a peak, up to where the curve exceeds the peak.
 
     curve  float64 (columns,)
 
-    The nearest of equally low places is returned, as by `scipy.signal.peak_prominences`.
+    The nearest of equally low columns is returned, as by `scipy.signal.peak_prominences`.
     """
     higher = np.flatnonzero(curve > curve[peak])
     start = higher[higher < peak].max(initial=-1) + 1
