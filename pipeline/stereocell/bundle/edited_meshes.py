@@ -334,7 +334,7 @@ def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
         return mesh, defects
     _, first, twin = np.unique(mesh.positions, axis=0, return_index=True, return_inverse=True)
     triangles = first[twin.ravel()][mesh.triangles].astype(np.uint32)
-    # Triangles at the pole of a UV sphere collapse.
+    # Joining vertices makes some triangles collapse, for example at the pole of a UV sphere.
     has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     triangles = triangles[has_area]
     welded = compact(mesh, triangles)

@@ -21,7 +21,7 @@ from stereocell.storage.file_list import sizes_of
 from stereocell.storage.json_files import read_json, write_json
 
 _RECORD = "tile.json"
-# Parts of earlier versions have another name for the areas.
+# The records of earlier versions call the areas of interfaces `wall_um2`.
 _INTERFACE_UM2 = Field(validation_alias=AliasChoices("interface_um2", "wall_um2"))
 
 
@@ -123,7 +123,7 @@ def read_part(part: Path) -> BundleTile:
         raise OutputError(f"{part / _RECORD}: damaged: {remedy}") from None
     sizes = sizes_of(part)
     refs = [ref for channel in tile.channels for ref in channel.files]
-    # Files are moved by these paths, so each must be a file of this folder.
+    # Files are moved by the paths in the record, so each path must be one of a file in this folder.
     if tile.id != part.name or any(sizes.get(ref.path) != ref.bytes for ref in refs):
         raise OutputError(f"{part}: damaged: {remedy}")
     return tile

@@ -66,7 +66,8 @@ def write_objects(
         content["paint"] = paint
     for i, column in enumerate(table.columns):
         data, entry = _describe(column)
-        # The number keeps names apart on disks that ignore case: IDs may differ only by case.
+        # The column's number keeps file names apart on disks that ignore case, since the IDs of
+        # columns may differ only by case.
         entry["bytes"] = write(f"{i}_{column.id}.u8", data)
         values = column.values.astype("<f4")
         entry["exact"] = write(f"{i}_{column.id}.f32", values)

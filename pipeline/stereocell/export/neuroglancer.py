@@ -40,7 +40,7 @@ from stereocell.model.extra_packages import import_extra
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
 
-_NM = 1e-9  # m
+_NM = 1e-9  # metres
 Surface = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
 
@@ -145,7 +145,7 @@ def _places(chosen: Chosen, layout: Layout | None) -> NDArray[np.float64]:
     grid = layout.grid
     to_source[:3] *= METERS_PER_UNIT / UNITS_M[grid.unit]
     to_index = np.linalg.inv(grid.affine) @ to_source
-    to_index[:3, 3] += 0.5  # a voxel's centre
+    to_index[:3, 3] += 0.5  # voxel k spans k to k + 1, so its centre is at k + 0.5
     return np.diag([*_resolution(layout), 1.0]) @ to_index
 
 

@@ -120,7 +120,7 @@ class SceneFiles:
             for id_, tileset in self._tilesets.items()
             for uri, _ in surfaces(without_finer(tileset["root"], levels.surfaces))
         )
-        return sum(frames) + sum(meshes) // 4  # gzip shrinks a .glb to more than a quarter
+        return sum(frames) + sum(meshes) // 4  # gzip leaves more than a quarter of a .glb
 
     def at(self, levels: Levels) -> dict[str, Packed]:
         """Return all files by path: the bundle at some levels, and the viewer's environments."""

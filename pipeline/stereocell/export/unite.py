@@ -33,7 +33,8 @@ def weld(
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Join meshes; merge vertices at equal positions, and drop triangles that collapse."""
     firsts = np.cumsum([0, *(len(positions) for positions, _ in parts)])
-    places = np.concatenate([positions for positions, _ in parts]) + np.float32(0)  # no -0.0
+    # Adding 0 turns -0.0 into 0.0, so that equal positions have equal bytes.
+    places = np.concatenate([positions for positions, _ in parts]) + np.float32(0)
     triangles = np.concatenate(
         [part.astype(np.int64) + first for (_, part), first in zip(parts, firsts[:-1], strict=True)]
     )

@@ -167,6 +167,6 @@ def _relative(asset: str, folder: Path) -> str:
         return asset
     try:
         found = Path(os.path.relpath(asset, folder)).as_posix()
-    except ValueError:  # on Windows: another drive
+    except ValueError:  # on Windows, if the asset is on another drive
         return Path(asset).as_posix()
     return found if found.startswith("../") else f"./{found}"

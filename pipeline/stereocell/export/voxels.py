@@ -29,7 +29,7 @@ _OFF = 1e-2  # voxels, largest distance of a tile from the lattice of the first 
 _IMAGE_AXES = np.diag([1.0, -1.0, 1.0])  # matrix from the world's axes to those of an image
 _AS_BYTES = (0.0, 255.0)  # window of 8-bit sources: the stage's bytes then are the source's values
 
-_BLOCK = 1 << 20  # bytes, size of a block of zeros
+_BLOCK = 1 << 20  # bytes of zeros that are written at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,7 +292,7 @@ def _grid(
     columns = to_source @ steps.T * factor
     spacing = np.linalg.norm(columns, axis=0)
     x, y, z = size.tolist()
-    origin = to_source @ start * factor + 0.0  # no -0.0
+    origin = to_source @ start * factor + 0.0  # turns -0.0 into 0.0
     return VoxelGrid((x, y, z), spacing, origin, columns / spacing + 0.0, unit, is_patient)
 
 

@@ -114,6 +114,6 @@ def _smooth(knots: NDArray[np.float64]) -> NDArray[np.float64]:
         around = ndimage.gaussian_filter(weight, sigma, mode="nearest")
         if around.min() > 1e-6:
             break
-        sigma *= 2  # there is a gap wider than the filter
+        sigma *= 2  # a gap between known values is wider than the filter
     smoothed = ndimage.gaussian_filter(filled, sigma, mode="nearest") / around
     return np.asarray(smoothed, np.float64)

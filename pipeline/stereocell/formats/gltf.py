@@ -224,7 +224,8 @@ def encode_glb(
             }
         ]
     if features is not None:
-        of_objects = ["EXT_mesh_features", "EXT_structural_metadata"]  # not required for drawing
+        # These extensions are not required: a viewer can draw the mesh without them.
+        of_objects = ["EXT_mesh_features", "EXT_structural_metadata"]
         document["extensionsUsed"] = [*extensions, *of_objects]
         ids, metadata = describe_features(buffers, features, extras.get("channel", name))
         primitive["extensions"] = {"EXT_mesh_features": ids}

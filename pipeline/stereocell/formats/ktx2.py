@@ -30,7 +30,7 @@ _CHANNEL_TYPES = (0, 1, 2, 15)  # red, green, blue, alpha
 _ORIENTATIONS = {2: "rd", 3: "rdo"}
 _ZSTD = 2
 _MAX_BYTES = 1 << 31  # largest number of bytes of a level that is read
-_ZSTD_LEVEL = 3  # 9 made noisy 8-bit volumes 1 to 2 % smaller and took 3 to 5 times as long
+_ZSTD_LEVEL = 3  # level 9 made noisy volumes 1 to 2 % smaller, in 3 to 5 times the time
 
 
 @dataclass(frozen=True, slots=True)

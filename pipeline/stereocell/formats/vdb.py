@@ -236,7 +236,8 @@ def _cut_leaves(grid: _Grid) -> _Leaves:
 
 def _topology(grid: _Grid, origins: NDArray[np.int64], masks: NDArray[np.uint8]) -> bytes:
     """Return the tree without the values of its leaves."""
-    nothing = b"" if grid.is_half else bytes(8)  # floats have a length even without values
+    # A grid of floats states the length of the values of a node even if it has no values.
+    nothing = b"" if grid.is_half else bytes(8)
     roots = _runs(origins // (NODE4 * NODE5))
     parts = [struct.pack("<ifII", 1, float(grid.background), 0, len(roots))]
     for start, stop in roots:

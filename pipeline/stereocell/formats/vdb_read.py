@@ -87,7 +87,7 @@ def _read_grids(file: BinaryIO, count: int) -> Iterator[VdbGrid]:
         if _text(file) in _MAPS:
             numbers = np.frombuffer(file.read(48), dtype="<f8")
             origin, spacing = numbers[:3], numbers[3:]
-        # If two grids have the same name, a counter follows it after a separator.
+        # If two grids have the same name, a separator and a counter follow the name.
         yield VdbGrid(name.split("\x1e")[0], spacing, origin, tree, start, blocks, end)
         file.seek(end)
 

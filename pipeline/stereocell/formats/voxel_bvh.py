@@ -189,7 +189,8 @@ def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
     counts = np.ones((1, 1, 1), dtype=np.int64)
     for axis, n in enumerate(volume.shape):
         starts = np.arange(0, n, STREAM_BRICK)
-        sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.uint32)  # at most 16^3 * 255
+        # The sum over a brick is at most 16^3 * 255, which uint32 holds.
+        sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.uint32)
         shape = [1, 1, 1]
         shape[axis] = len(starts)
         counts = counts * np.diff(np.append(starts, n)).reshape(shape)
@@ -269,7 +270,7 @@ def _error(
         flat = difference.ravel()
         largest = max(largest, flat.max(), -flat.min())
         squares += float(np.dot(flat, flat))
-    # float32 is off by about 1e-5 where the difference is a whole number.
+    # Rounding errors of float32, about 1e-5, must not raise a whole difference to the next number.
     return int(np.ceil(min(float(largest) - 1e-3, 255))), float(np.sqrt(squares / box.size))
 
 

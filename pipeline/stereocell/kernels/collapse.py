@@ -72,7 +72,7 @@ LAST = 40
 # Square of .6. If triangles around a vertex are sharper than the bound, a collapse may leave .6 of
 # their sharpest angle. The code compares 1 - cos, which grows with the square of an angle.
 SHARPER = 0.36
-BLOCK = 4096  # vertices that are processed together
+BLOCK = 4096  # number of vertices, near one another, that are processed together
 
 
 class Limits(NamedTuple):
@@ -200,7 +200,7 @@ def collapse_in_place(mesh: Mesh, triangles: Ints, past: Ints, work: Work, limit
     find_costs(mesh, work)
     n, block, turn = len(mesh.at), limits.block, 0
     blocks = -(-n // block) if n > block and len(past) == 0 else 0
-    for number in range(blocks + 1):  # the last one is the whole mesh
+    for number in range(blocks + 1):  # after the blocks, the whole mesh
         is_last = number == blocks
         low, high = (0, n) if is_last else (number * block, min((number + 1) * block, n))
         for limit in range(CLASSES + 1):

@@ -37,8 +37,8 @@ class Ring(NamedTuple):
     """The triangles around a vertex, and its neighbours; the arrays fit the largest ring."""
 
     out: Ints  # the half-edge of each triangle that leaves the vertex
-    first: Ints  # next corner of each triangle
-    second: Ints  # last corner of each triangle
+    first: Ints  # the corner after the vertex, of each triangle
+    second: Ints  # the corner before the vertex, of each triangle
     near: Ints  # neighbours; in a surface the same as `first`
     shared: Ints  # interfaces: number of triangles at the edge to each neighbour
     price: Points  # price of moving onto each neighbour

@@ -170,7 +170,7 @@ class FineVolumes:
             moves[same] = earlier.kept.moves[place]
         placed: Mesh | None = None
         faulty, are_many = np.zeros(0, np.int64), False
-        # After TRIES, at least one more body stops moving each time
+        # The loop ends, because after TRIES tries at least one more body stops moving in each try.
         for number in itertools.count():
             # A vertex that does not move stays bit by bit: a sum would lose the sign of a zero.
             positions = np.where(moves == 0, mesh.positions, (start + moves).astype(np.float32))

@@ -109,7 +109,7 @@ def keep_volumes(
     positions, past = interfaces.positions, interfaces.positions
     at_fault = np.zeros(0, np.int64)
     for turn in range(_ROUNDS):
-        if turn < _SEARCHES:  # since fixed vertices make the others move farther
+        if turn < _SEARCHES:  # newly fixed vertices make the others move farther
             moved = _moved(interfaces, positions, volumes_um3, fixed, most_um)
             positions = put_on_lattice(moved, step_um)
         fresh = (positions != past).any(axis=1)

@@ -67,10 +67,11 @@ def _mend(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int3
                 flat[voxel] = label
                 touched.add(voxel)
                 changed.add(voxel)
-        thin = _find_thin(labels, mended)  # in each round, since noise takes many rounds
+        # Thin objects are looked for in each round, since a noisy label map takes many rounds.
+        thin = _find_thin(labels, mended)
         if len(thin):
             return mended, thin
-    # Pinches remain after the last round
+    # Objects that still have pinches after the last round count as too thin.
     return mended, np.unique(flat[places[:, 0]]).astype(np.int32)
 
 

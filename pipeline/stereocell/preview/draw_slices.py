@@ -228,7 +228,8 @@ def _zero_line(
     if is_dashed:
         dash = round(_DASH_PX * _FINE * weight)
         is_drawn = np.arange(fine[0] + fine[1]) // dash % 2 == 0
-        edge &= sliding_window_view(is_drawn, fine[0])[: fine[1]]  # along the diagonals
+        # Dashes and gaps alternate along the diagonals of the picture.
+        edge &= sliding_window_view(is_drawn, fine[0])[: fine[1]]
     return _averaged(edge, weight)
 
 

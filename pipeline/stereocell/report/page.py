@@ -48,7 +48,8 @@ from stereocell.textures.unwrap import mip_levels_apart
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
 MAX_PICTURED = 60  # largest number of units with pictures
 MAX_ROWS = 400  # largest number of units in a table
-_TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # largest number drawn in one picture
+# Largest number of triangles in one picture, of a tile and of the whole specimen
+_TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000
 # pixels: width and largest height of a picture
 _TILE_PX, _WHOLE_PX = (420, 420), (1120, 620)
 
@@ -67,7 +68,7 @@ def write_report(out: Path) -> None:
 def render(out_folder: OutFolder, facts: Facts) -> str:
     """Return the page as HTML."""
     plan = facts.plan
-    tissue = find_tissue(out_folder.out, plan)  # first, since damaged files raise an error here
+    tissue = find_tissue(out_folder.out, plan)  # read first, since damaged files raise an error
     chosen = choose_units(len(plan.tiles), len(plan.channels), MAX_PICTURED)
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}

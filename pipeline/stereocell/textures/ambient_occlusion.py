@@ -20,7 +20,7 @@ from stereocell.model.volume import xyz_to_zyx
 
 DIRECTIONS = 48  # number of rays over the whole sphere; half of them rise above a surface
 STEP = 0.75  # step along a ray, in coarsest voxel spacings
-NEIGHBOURS = 4  # number of points with values whose mean other points take
+NEIGHBOURS = 4  # number of nearest known values whose weighted mean a point takes
 
 
 def find_ambient_visibility(

@@ -114,7 +114,7 @@ class Baker:
         """
         if self._corners is None:
             self._corners = cKDTree(self._vertices, balanced_tree=False, compact_nodes=False)
-        # A list of k numbers makes the result have k columns, even for k = 1.
+        # For a list of k numbers, the tree's query returns k columns, even for k = 1.
         columns = list(range(1, min(NEIGHBOURS, self._corners.n) + 1))
         distance, near = self._corners.query(points, k=columns)
         closeness: NDArray[np.float64] = 1 / np.maximum(distance, 1e-6)

@@ -36,7 +36,7 @@ def find_texels(
     weights_of = np.zeros((height * width, 3))
     for triangle, weights, texel, outside in _cover(corners, size, beyond):
         better = np.flatnonzero(outside < nearest[texel])
-        # The best one comes last, since the last assignment to a texel remains.
+        # The nearest triangle of a texel comes last, since the last assignment to a texel remains.
         order = better[np.argsort(-outside[better], kind="stable")]
         at = texel[order]
         nearest[at] = outside[order]
@@ -90,7 +90,7 @@ def _cover(
     low, high = _boxes(corners, size, beyond)
     extent = np.maximum(high - low + 1, 0)
     frames, is_flat = _frames(corners)
-    count = np.where(is_flat, 0, extent.prod(axis=1))  # nothing is near flat triangles
+    count = np.where(is_flat, 0, extent.prod(axis=1))  # flat triangles cover no pixel
     ends = np.cumsum(count)
     first = 0
     while first < len(corners):

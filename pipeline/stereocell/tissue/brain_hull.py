@@ -77,7 +77,7 @@ def _inflate(
     depths = np.arange(1.0, DEEP_MM, EVERY_MM)
     near = int((depths < NEAR_MM).sum())
     edge_of = triangles[:, 0], triangles[:, 1]
-    padded = np.pad(field, 1).astype(np.float32)  # 0 beyond the ends
+    padded = np.pad(field, 1).astype(np.float32)  # voxels beyond the ends count as 0
     sharp, blunt = (1 / r for r in SMOOTH_MM)
     for _ in range(ITERATIONS):
         normals = _normals(points, triangles)

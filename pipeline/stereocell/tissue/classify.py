@@ -98,9 +98,11 @@ def learn_tissue(voxels: NDArray[Any], spacing_um: Spacing, *, options: TissueOp
 
     counts = AUTO_CLASSES if options.classes == "auto" else [options.classes]
     flat = flat_field(shape, options.bias_degree)
-    # Each number of classes has a field of its own, because the two depend on each other.
+    # A bias field is learned for each number of classes, because field and classes depend on each
+    # other.
     fields = {k: _learn_field(flat, sampled, indices, k, options) for k in counts}
-    scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))  # voxels that smoothing makes dependent
+    # Number of voxels around each voxel that smoothing makes dependent on one another
+    scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))
     independent = min(1.0, int(inside.sum()) / len(calm) / max(scale, 1e-9))
     bic, has_modes = {}, {}
     for k, field in fields.items():
@@ -186,10 +188,10 @@ def _score(
     calm = samples[:, 1] <= np.quantile(samples[:, 1], 0.5)
     values = samples[calm, :1] / np.exp(log_field[calm])[:, None]
     mixture = _fit(values, count)
-    # Density of the voxels before correction
+    # Mean log-likelihood of the voxels as they were before the bias field was removed
     likelihood = float(mixture.score(values)) - float(log_field[calm].mean())
     n = max(2.0, independent * len(values))
-    parameters = 2 * count  # means, all shares except one, one variance
+    parameters = 2 * count  # free parameters: means, all shares except one, one variance
     order = np.argsort(mixture.means_[:, 0])
     means, shares = mixture.means_[order, 0], mixture.weights_[order]
     are_modes = _dips(values[:, 0], means) < SHALLOWEST_DIP

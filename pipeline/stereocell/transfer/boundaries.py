@@ -44,7 +44,9 @@ MIN_SHARE = 0.05  # least share of a boundary in the voxels that all boundaries 
 # Least relative growth of squares without a boundary that passes over a third material
 MIN_MISSED = 0.05
 MIN_VOXELS = 2e-5  # least share of all voxels; a ball of 40 voxels in 256^3 has twice as many
-MIN_COUNT = 20.0  # voxels; cells with fewer get no more weight, because no edge is quite ideal
+# Number of voxels; cells of the histogram with fewer voxels get no more weight, because no edge is
+# quite ideal
+MIN_COUNT = 20.0
 MAX_BOUNDARIES = 6
 CLEAR = 2.0  # standard deviations of noise that a shape keeps away from a material's value
 EVEN: Ratios = (1.0, 1.0, 1.0)

@@ -89,13 +89,14 @@ def find_statistics(
     if not high > low:  # a sparse channel has fewer bright voxels than the percentile leaves out
         low, high = float(voxels.min()), float(voxels.max())
     if not high > low:
-        high = low + max(1.0, 1e-6 * abs(low))  # more than float32 can distinguish
+        # The window becomes so wide that float32 distinguishes its ends.
+        high = low + max(1.0, 1e-6 * abs(low))
     if window is not None:
         low, high = window
     if voxels.dtype.kind == "f" and high - low < 1e-3 * max(abs(low), abs(high)):
         voxels = voxels.astype(np.float64)  # float32 has no edges for such narrow bins
     counts = np.zeros(BINS, np.int64)
-    # In parts, because a clipped integer takes eight bytes
+    # The voxels are counted in parts, because clipping turns each integer into eight bytes.
     for start in range(0, voxels.size, _AT_ONCE):
         part = np.clip(voxels[start : start + _AT_ONCE], low, high)
         counts += np.histogram(part, BINS, (low, high))[0]

@@ -29,7 +29,8 @@ _CONTRAST = (0.97, 0.5, 0.48)
 _BONE = (1.0, 1.0, 1.0)
 _SOFT_HU = 40.0  # Hounsfield units over which neighbouring bands blend
 _AIR_STEP_HU = 220.0  # Hounsfield units; least step over two voxels of an edge to air
-_FAT_FROM_HU = -150.0  # blurred skin has the values of the thinnest fat
+# Hounsfield units at which fat's band begins; below it, skin has such values when it is blurred
+_FAT_FROM_HU = -150.0
 # Largest ratio of the coarsest to the finest voxel spacing. Across thicker slices an edge to air is
 # as flat as one between tissues.
 MAX_UNEVEN = 3.0

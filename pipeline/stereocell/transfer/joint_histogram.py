@@ -71,7 +71,8 @@ def count_joint(
     voxels = np.pad(voxels, short, mode="edge") if (1, 1) in short else voxels
     factor = np.float32((rows - 1) / (255 * gradient_max))
     counts = np.zeros(rows * COLUMNS, np.int64)
-    for z in range(1, len(voxels) - 1, every):  # by planes, which stay in the processor's cache
+    # The voxels are counted slice by slice, since slices fit into the processor's cache.
+    for z in range(1, len(voxels) - 1, every):
         steps = find_steps(voxels[z - 1 : z + 2], spacing_um)[0]
         row = np.minimum(steps * factor + np.float32(0.5), rows - 1).astype(np.intp)
         row *= COLUMNS

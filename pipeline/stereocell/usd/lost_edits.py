@@ -32,7 +32,7 @@ from stereocell.usd.specimen import specimen_of
 
 _BINDING = "material:binding"
 _COLLECTION = "collection:"
-# Places where a material's binding needs no strength: no stronger binding lies below them
+# Places where a bound material needs no `strongerThanDescendants`: no prim below has a binding
 _OWN_BINDING = ("mesh", "addition", "group")
 _MOST_LINES = 3  # largest number of similar edits with a line each; more of them share one line
 _GROUPS = ("Xform", "Scope", "")  # types of prims that only group other prims
@@ -239,7 +239,7 @@ class _Finder:
             return LostEdit(str(path), "prim", "it is in a variant that is not selected")
         kind = str(own.GetTypeName()) if own else ""
         if kind in _GROUPS and not (own and own.IsAbstract()):
-            return _Fate.COVERED  # by the lines on the prims below it
+            return _Fate.COVERED  # messages on the prims in the group are enough
         self._covered.add(path)
         if not path.HasPrefix(self._specimen.root):
             reason = f"it lies outside {self._specimen.root}"

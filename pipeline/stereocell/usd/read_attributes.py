@@ -13,7 +13,7 @@ from stereocell.usd.typed_values import read_as, require_type
 Point = tuple[float, float, float]
 
 
-def value_of(prim: Usd.Prim, name: str, expected: Sdf.ValueTypeName) -> Any:  # USD's type of it
+def value_of(prim: Usd.Prim, name: str, expected: Sdf.ValueTypeName) -> Any:  # USD's own type
     """Return an attribute's value at the default time.
 
     Raises StageError if it has no value, or one of another type than `expected`.

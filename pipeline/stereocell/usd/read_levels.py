@@ -159,7 +159,8 @@ def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> Compose
         has_color = False
     given = read_as(UsdGeom.Gprim(prim).GetDisplayColorAttr(), _Types.Color3fArray)
     colors = np.array(given or [], np.float64)
-    if not has_color and colors.size:  # the average of the mesh's colours replaces lost ones
+    # If colours no longer fit the faces, the mean of the mesh's colours replaces them.
+    if not has_color and colors.size:
         r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
         lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
     return replace(lod, lost=tuple(lost))

@@ -202,7 +202,7 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
     mesh = UsdGeom.Mesh.Define(stage, branch.GetPath().AppendChild(_leaf(tile, channel)))
     mesh.GetPrim().AddAppliedSchema(SURFACE_API)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)  # the surface is open at the faces of its tile
+    mesh.CreateDoubleSidedAttr(True)  # its inside can be seen, since it is open at the tile's faces
     _bind(mesh, branch, _leaf(tile, channel, "_look"))
     if channel.objects is not None:
         look = branch.GetPath().AppendChild(_leaf(tile, channel, "_look"))

@@ -239,7 +239,7 @@ def _define_additions(
 def _fill_mesh(mesh: UsdGeom.Mesh, shape: Mesh, positions: NDArray[np.float64]) -> None:
     points, triangles = vec3f(positions), shape.triangles.astype(np.int32)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)  # the surface is open at the faces of its tile
+    mesh.CreateDoubleSidedAttr(True)  # its inside can be seen, since it is open at the tile's faces
     mesh.CreatePointsAttr(points)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))

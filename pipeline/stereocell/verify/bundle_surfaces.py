@@ -38,8 +38,10 @@ _MAP_DIFFERENCE = 1.0  # 0..255, largest mean difference of texels, since encode
 _ODD_SHARE = 0.01
 _TURNED = math.radians(3)  # rad, largest difference of normals: two steps of 8-bit octahedral ones
 _UV_STEP = 1e-4  # largest difference of a UV coordinate, 0..1; six steps of 16 bits
-_ROUNDED = 1.001  # factor, since errors are rounded up to four digits
-_BOX_M = 2e-9  # m, since boxes are rounded outwards to whole nm
+# Factor by which a stated error may exceed the measured one, since it is rounded up to four digits
+_ROUNDED = 1.001
+# Metres by which a stated box may exceed its surfaces, since it is rounded outwards to whole nm
+_BOX_M = 2e-9
 _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
     "normalTexture": ("normal", encode_normal_map),
     "occlusionTexture": ("occlusion", encode_occlusion_map),
@@ -122,7 +124,7 @@ def _compare_boxes(
         return
     low = np.min([low for low, _ in corners], axis=0).astype(np.float64)
     high = np.max([high for _, high in corners], axis=0).astype(np.float64)
-    # In meshes y points up, in boxes z.
+    # In meshes y points up, and in the boxes of tilesets z points up.
     low, high = np.array([low[0], -high[2], low[1]]), np.array([high[0], -low[2], high[1]])
     slack = _BOX_M + 4e-7 * max(float(np.abs(low).max()), float(np.abs(high).max()))
     for level, content in contents.items():
@@ -311,7 +313,7 @@ def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterat
         if path is None or (is_last and kind != "color" and name not in drawn.maps):
             if path is None and name in drawn.maps:
                 yield f"found a map ({kind}), but the stage has none"
-            continue  # the coarsest level needs no maps
+            continue  # the coarsest level may have its values at vertices instead
         if name not in drawn.maps:
             yield f"the map {named} is missing"
             continue
