@@ -150,7 +150,7 @@ def _bake(appearance: ComposedAppearance) -> np.ndarray[Any, np.dtype[np.uint8]]
 
 
 def _totals(tiles: Iterable[Sequence[int]]) -> list[int]:
-    """Return the number of triangles of all tiles by level.
+    """Return the number of triangles of all tiles at each level of detail.
 
     A tile with fewer levels counts with its coarsest level.
     """
@@ -160,7 +160,7 @@ def _totals(tiles: Iterable[Sequence[int]]) -> list[int]:
 
 
 def _farthest(tiles: Iterable[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
-    """Return the largest distances of all tiles by level.
+    """Return the largest distances, over all tiles, at each level of detail.
 
     A tile with fewer levels counts with its coarsest level.
     """

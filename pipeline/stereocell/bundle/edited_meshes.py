@@ -58,7 +58,7 @@ _Types = Sdf.ValueTypeNames
 
 
 class _Options(NamedTuple):
-    """The options with which levels are computed."""
+    """The options with which levels of detail are computed."""
 
     lod: LodOptions
     unwrap: UnwrapOptions
@@ -77,7 +77,7 @@ _DEFECTS = {
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """The levels that a bundle shows, finest first, and a message about edits, or empty."""
+    """The levels of detail that a bundle shows, finest first, and a message on edits, or empty."""
 
     lods: tuple[ComposedLod, ...]
     edit: str = ""
@@ -109,7 +109,7 @@ def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
 
 
 def _edited_levels(lods: Sequence[ComposedLod]) -> set[int]:
-    """Return the levels whose shape differs from the build, or that were moved separately."""
+    """Return the levels of detail whose shape was edited, or that were moved alone."""
     edited = {lod.level for lod in lods if lod.shape != lod.built}
     if len({lod.own for lod in lods}) > 1:
         still = tuple(np.eye(4).ravel().tolist())
@@ -355,7 +355,7 @@ def _describe(defects: Defects) -> str:
 
 
 def _cut_planes(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[Plane, ...]:
-    """Return the faces of the tile's box at which the mesh is open.
+    """Return the planes of the faces of the tile's box at which the mesh is open.
 
     The stage does not state these planes. They are found by open edges near the box's faces whose
     two ends have exactly the same coordinate. Vertices that an artist moved do not have that.
@@ -411,7 +411,7 @@ def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> Spacing:
 
 
 def _options(stage: Usd.Stage) -> _Options:
-    """Return the options with which the stage's levels were made, or the defaults.
+    """Return the options with which the stage's levels of detail were made, or the defaults.
 
     Raises StageError for invalid values.
     """

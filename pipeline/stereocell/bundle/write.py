@@ -211,7 +211,7 @@ def _write_added(composed: Composed, root: Path) -> tuple[dict[str, Any], list[F
 
 
 def views_of(stage: Usd.Stage) -> list[StageView]:
-    """Return the named views of a stage. Raises StageError."""
+    """Return the named camera views of a stage. Raises StageError for a wrong camera."""
     return list(read_views(stage, *_box_of(stage)))
 
 

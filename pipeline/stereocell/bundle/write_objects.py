@@ -94,7 +94,7 @@ def hash_parts(data: bytes) -> list[str]:
 
 
 def _compact(rows: NDArray[np.int32]) -> dict[str, Any]:
-    """Describe rows as a run of consecutive rows from the first on, and a list of the others."""
+    """Describe row numbers: a run of consecutive ones from the first on, and a list of the rest."""
     if len(rows) == 0:
         return {"first": 0, "count": 0}
     is_next = rows == rows[0] + np.arange(len(rows))

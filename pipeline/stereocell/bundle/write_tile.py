@@ -172,7 +172,7 @@ def _export_channel(
 
 
 def _bare(lod: ComposedLod) -> ComposedLod:
-    """Return the coarsest level without details that show only at close range.
+    """Return the coarsest level of detail without values that show only at close range.
 
     Users wait for this level first. In the sample, maps, UVs and vertices that charts had split
     were five sixths of the coarsest level's bytes. The occlusion moves from the map to the

@@ -123,7 +123,7 @@ def _level(parts: list[Surface], to_nm: NDArray[np.float64]) -> Level:
 
 
 def _different(levels: list[Level]) -> list[Level]:
-    """Return the levels, finest first, without those that repeat the triangles of a finer one."""
+    """Return levels of detail, finest first, without those that repeat a finer one's triangles."""
     kept = levels[:1]
     for level in levels[1:]:
         if len(level.triangles) < len(kept[-1].triangles):

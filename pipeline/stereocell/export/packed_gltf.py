@@ -28,7 +28,7 @@ _DRACO_TYPES = {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2}  # GeometryAttribute::
 
 
 def packed_buffers(name: str, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> Buffers:
-    """Return buffers for a compression.
+    """Return the buffers that compress meshes by one of the two extensions.
 
     name           `meshopt` or `draco`
     low_m, high_m  corners (x, y, z) of the specimen's box, metres

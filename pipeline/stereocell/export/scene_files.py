@@ -93,13 +93,13 @@ class SceneFiles:
 
     @property
     def surface_levels(self) -> int:
-        """The number of levels of the surfaces; 0: there are no surfaces."""
+        """The largest number of levels of detail of a surface; 0: there are no surfaces."""
         roots = (tileset["root"] for tileset in self._tilesets.values())
         return max((lod + 1 for root in roots for _, lod in surfaces(root)), default=0)
 
     @property
     def volume_levels(self) -> int:
-        """The number of mip levels of the volumes; 0: there are no volumes."""
+        """The largest number of mip levels of a volume; 0: there are no volumes."""
         return max((len(one["levels"]) for one in self._volume_entries()), default=0)
 
     def largest_volume(self, levels: Levels) -> tuple[int, int, int]:
@@ -123,7 +123,7 @@ class SceneFiles:
         return sum(frames) + sum(meshes) // 4  # gzip leaves more than a quarter of a .glb
 
     def at(self, levels: Levels) -> dict[str, Packed]:
-        """Return all files by path: the bundle at some levels, and the viewer's environments."""
+        """Return all files by path: the bundle without finer levels, and the viewer's environments."""
         made: dict[str, bytes | None] = {}
         manifest = {**self._manifest, "channels": [], "usdz": None, "usdz_reason": _NO_USDZ}
         for channel in self.channels:

@@ -270,7 +270,7 @@ def _cut(
 
 
 def _corners(low: NDArray[Any], high: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the eight corners (8, 3) of a box."""
+    """Return the eight corners (8, 3) of the box between two corners."""
     return np.array(list(product(*zip(low.tolist(), high.tolist(), strict=True))), np.float64)
 
 

@@ -103,7 +103,7 @@ def _to_the_ends(lattice: LatticeField, shape: tuple[int, ...]) -> LatticeField:
 
 
 def _smooth(knots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the knots smoothed. Knots without a value take those of their neighbours."""
+    """Return the knots' values smoothed. Knots without a value take their neighbours' values."""
     is_known = np.isfinite(knots)
     if not is_known.any():
         return np.zeros_like(knots)

@@ -93,7 +93,7 @@ def _second_difference(slices: NDArray[np.float32], row: int, column: int) -> ND
 
 
 def _typical(differences: NDArray[np.float32]) -> float:
-    """Return the standard deviation of noise with such differences; the largest are edges."""
+    """Return the deviation of noise with these differences; the largest are left out as edges."""
     if not len(differences):
         return 0.0
     kept = max(1, int(_KEPT * len(differences)))

@@ -75,7 +75,7 @@ class Table:
 
     @property
     def bytes(self) -> int:
-        """Length of the table in bytes. In a file the bricks begin there."""
+        """Length of the table in bytes. In a file, the bricks begin at this position."""
         return HEADER.size + self.nodes.nbytes
 
 

@@ -46,7 +46,7 @@ def read_latlong(file: Path) -> Radiance:
 
 
 def _reduced(image: NDArray[np.floating]) -> Radiance:
-    """Return means of square blocks, at most MAX_COLUMNS in a row; the last may be smaller."""
+    """Return means of squares of texels, at most MAX_COLUMNS in a row; the last may be smaller."""
     factor = -(-image.shape[1] // MAX_COLUMNS)
     if factor == 1:
         return image.astype(np.float32)

@@ -26,14 +26,14 @@ Encode = Callable[..., bytes]
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A level of a mesh: positions float64 (n, 3), nm; triangles uint32 (m, 3)."""
+    """A mesh at one level of detail: positions float64 (n, 3), nm; triangles uint32 (m, 3)."""
 
     positions: NDArray[np.float64]
     triangles: NDArray[np.uint32]
 
     @property
     def edge_nm(self) -> float:
-        """The approximate length of an edge, which is what the level resolves."""
+        """The approximate length of a triangle's edge, which is the level's smallest detail."""
         a, b, c = self.positions[self.triangles].transpose(1, 0, 2)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
         return float(np.sqrt(2 * area / max(len(self.triangles), 1)))

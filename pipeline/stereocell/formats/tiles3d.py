@@ -145,7 +145,7 @@ class _Box:
 
     @classmethod
     def around(cls, lods: Sequence[TileLod]) -> "_Box":
-        """Return the box of all LODs, rounded outwards. A tile's box contains its children's."""
+        """Return the box of all LODs, rounded outwards; it must contain the boxes of children."""
         lows = zip(*(lod.min_m for lod in lods), strict=True)
         highs = zip(*(lod.max_m for lod in lods), strict=True)
         return cls._evened(

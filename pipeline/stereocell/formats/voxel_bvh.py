@@ -184,7 +184,7 @@ def _halve(values: NDArray[np.uint8] | Floats, axis: int) -> Floats:
 
 
 def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
-    """Return, for each level, the rounded mean of the texels in each of its nodes' boxes."""
+    """Return, for each tree level, the rounded mean of the texels in the box of each node."""
     sums: NDArray[Any] = volume
     counts = np.ones((1, 1, 1), dtype=np.int64)
     for axis, n in enumerate(volume.shape):
@@ -204,7 +204,7 @@ def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
 
 
 def _pad(level: Bytes3, grid: tuple[int, ...]) -> Bytes3:
-    """Return the texels of a level's bricks, with an apron, and with whole bricks at the end."""
+    """Return the texels of a mip level, with an apron, and with whole bricks at the ends."""
     widths = [(1, g * STREAM_BRICK + 1 - n) for g, n in zip(grid, level.shape, strict=True)]
     return np.pad(level, widths, mode="edge")
 
@@ -236,7 +236,7 @@ def _reduce_children(ufunc: np.ufunc, values: NDArray[Any], neutral: int) -> NDA
 
 
 def _cut(padded: Bytes3, places: NDArray[np.int64]) -> Bytes3:
-    """Return the bricks (n, 18, 18, 18) at these places (z, y, x) of a padded level."""
+    """Return the bricks (n, 18, 18, 18) at these brick indices (z, y, x) of a padded mip level."""
     windows = np.lib.stride_tricks.sliding_window_view(padded, (STORED,) * 3)
     bricks: Bytes3 = windows[::STREAM_BRICK, ::STREAM_BRICK, ::STREAM_BRICK][tuple(places.T)]
     return bricks

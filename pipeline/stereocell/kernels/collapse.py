@@ -171,7 +171,7 @@ def collapse_interfaces(
 def _run(
     mesh: Mesh, at: Points, triangles: Ints, past: Ints, limits: Limits
 ) -> tuple[Ints, Flags, Ints]:
-    """Return the result of `collapse` for a surface with edges, or for interfaces."""
+    """Return the result of `collapse` for a surface, or for interfaces."""
     n, is_a_surface = len(at), len(mesh.on_line) == 0
     work = Work(
         ring=make_ring(n, is_surface=is_a_surface),

@@ -39,7 +39,7 @@ class Ring(NamedTuple):
     out: Ints  # the half-edge of each triangle that leaves the vertex
     first: Ints  # the corner after the vertex, of each triangle
     second: Ints  # the corner before the vertex, of each triangle
-    near: Ints  # neighbours; in a surface the same as `first`
+    near: Ints  # neighbours; in a surface, this is `first`
     shared: Ints  # interfaces: number of triangles at the edge to each neighbour
     price: Points  # price of moving onto each neighbour
     marks: Ints  # interfaces: marks of neighbours

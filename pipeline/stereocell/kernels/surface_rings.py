@@ -60,7 +60,7 @@ def mark_fan(u: int, mesh: Mesh, marks: Flags) -> None:
 
 @step
 def check_fan_link(mesh: Mesh, ring: Ring, chosen: int) -> bool:
-    """Return whether the ends of an edge have two common neighbours, and not too many in all.
+    """Return whether an edge's ends have two common neighbours, and at most VALENCE in all.
 
     ring    stamped, see `stamp_fan`
     chosen  number of the edge's far end among the neighbours

@@ -59,7 +59,7 @@ Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
 
 @dataclass(frozen=True, slots=True)
 class RestoredLevel:
-    """A level whose bodies have their volumes back, as far as possible.
+    """A level of detail whose bodies have their volumes back, as far as possible.
 
     defects  remaining defects
     lacks    bool (n,), vertices of bodies whose volume is off by more than MAX_VOLUME_ERROR; all

@@ -39,7 +39,7 @@ def histogram(
 def candidates(
     heights: Sequence[float], *, taken: Sequence[float], others: Sequence[float]
 ) -> Markup:
-    """Return a chart of the histogram on which iso-values are found, with vertical lines at them.
+    """Return a chart of the histogram from which iso-values are found, with a line at each of them.
 
     heights        0..1, evenly spaced along the axis
     taken, others  positions on the axis, 0..1: the surface's iso-value, and the others found

@@ -91,13 +91,13 @@ class UnitFacts:
 
     @property
     def slowest_step(self) -> str:
-        """The step that took longest; empty where no times are recorded."""
+        """The build step that took longest; empty where no times are recorded."""
         return max(self.seconds, key=lambda step: self.seconds[step], default="")
 
 
 @dataclass(frozen=True, slots=True)
 class StepFacts:
-    """Seconds of one step over all units; `slowest` is the unit that took `largest`."""
+    """Seconds of one build step, over all units; `slowest` is the unit that took `largest`."""
 
     name: str
     median: float
@@ -272,7 +272,7 @@ class _Spent:
 
 
 def _steps(units: Sequence[UnitFacts]) -> tuple[StepFacts, ...]:
-    """Return the times of the steps, in the order in which units run them."""
+    """Return the times of the build steps, in the order in which units run them."""
     spent: dict[str, _Spent] = defaultdict(_Spent)
     for unit in sorted(units, key=lambda unit: -len(unit.seconds)):  # most steps first
         for step, seconds in unit.seconds.items():

@@ -13,7 +13,7 @@ from stereocell.steps.unit_files import load_objects, load_record
 class ObjectLevel:
     """One level of detail of all objects of a label map.
 
-    distance_um, farthest_um  distance from the faces between voxels, 99th percentile and largest
+    distance_um, farthest_um  distance from the faces between voxels, um: 99th percentile, largest
     bias   largest relative error of an object's volume, compared with its voxels
     bytes  size of the .glb files in the bundle
     """

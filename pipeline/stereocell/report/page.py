@@ -371,7 +371,7 @@ def _drawn_note(units: Sequence[UnitFacts], most: int) -> str:
 
 
 def _box_um(facts: Facts, tile: Tile) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the box that a tile's mesh fills, by two corners (x, y, z) in world um."""
+    """Return the bounding box of a tile's mesh as two corners (x, y, z), world um."""
     lattice = tile.lattice(facts.plan.region)
     ends = [lattice.start, [end - 1 for end in lattice.stop]]
     corners = zyx_to_xyz([facts.plan.position_um(end) for end in ends])

@@ -63,7 +63,7 @@ def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
 
 
 def _middle(read: Callable[[Box], NDArray[np.float32]], region: Box) -> list[int]:
-    """Return the voxel (z, y, x) at the centre of all classes, estimated from evenly spaced planes.
+    """Return the voxel (z, y, x) at the centre of all classes, estimated from evenly spaced slices.
 
     read  returns the probabilities 0..1 of a box, float32 (class, z, y, x)
     """

@@ -125,7 +125,7 @@ class Baker:
 
 
 def bake(coarse: Mesh, size: tuple[int, int], baker: Baker) -> Maps:
-    """Return the maps of a level.
+    """Return the maps of a level of detail.
 
     coarse  a mesh with UVs and tangents
     size    (height, width), texels

@@ -54,7 +54,7 @@ class Texturer:
         self._baker: Baker | None = None
 
     def texture(self, lod: Lod, level: int, vertices: NDArray[np.int64]) -> Lod:
-        """Return the level with maps, or with values at its vertices.
+        """Return a level of detail with maps, or with values at its vertices.
 
         level     number of the level, 0: the finest
         vertices  int64 (n,), index of each vertex in the finest level

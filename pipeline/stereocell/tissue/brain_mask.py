@@ -101,7 +101,7 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
 
 
 def _levels(field: NDArray[np.float32], head: Mask, brain: Mask) -> Triple:
-    """Return the levels of find_hull: dark, least bright value, the brain's median."""
+    """Return the voxel values for `find_hull`: dark, least bright value, the brain's median."""
     dark, bright = float(np.percentile(field, 2)), float(np.percentile(field[head], 98))
     return dark, dark + 0.1 * (bright - dark), float(np.median(field[brain]))
 
@@ -151,7 +151,7 @@ def _separability(values: NDArray[np.float32]) -> float:
 def _coarsen(
     field: NDArray[np.float32], mask: Mask, spacing_um: Triple
 ) -> tuple[NDArray[np.float32], Mask, Triple]:
-    """Return smoothed means over blocks of COARSE_UM, the majority of the mask, and the spacing."""
+    """Return smoothed means over cubes of COARSE_UM, the mask by majority, and the spacing."""
     z, y, x = (max(1, round(COARSE_UM / h)) for h in spacing_um)
     d, h, w = (n // k for n, k in zip(field.shape, (z, y, x), strict=True))
 

@@ -116,7 +116,7 @@ def _across(
     softness: float,
     smallest: float,
 ) -> NDArray[np.float64]:
-    """Return the share of opacity between edges at least `smallest` from their middle."""
+    """Return a shape's cover, 0..1, of values between its ends, at least `smallest` from the middle."""
     middle, half = (low + high) / 2, np.maximum((high - low) / 2, smallest)
     return _soften(1 - np.abs(value - middle) / half, softness)
 

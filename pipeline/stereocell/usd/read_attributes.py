@@ -86,7 +86,7 @@ def numbers_of(prim: Usd.Prim, name: str, count: int) -> list[float]:
 
 
 def sizes_of(prim: Usd.Prim, name: str, count: int) -> list[int]:
-    """Return an attribute's whole numbers. Raises StageError unless there are `count`, none < 0."""
+    """Return an attribute's whole numbers. Raises StageError unless there are `count` from 0 up."""
     numbers = numbers_of(prim, name, count)
     if not all(number >= 0 and number.is_integer() for number in numbers):
         raise StageError(

@@ -85,7 +85,7 @@ class ComposedLod:
 
 
 def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
-    """Yield the levels of detail of a channel's surface in a loaded tile, finest first.
+    """Yield a channel's surface in a loaded tile at each level of detail, finest first.
 
     Yields nothing if the tile has no surface. Raises StageError for a mesh that can't be drawn, for
     example without a material.
@@ -181,7 +181,7 @@ def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
 
 
 def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
-    """Return the levels from which an edit removed all faces."""
+    """Return the levels of detail from which an edit removed all faces."""
     found = []
     for level in lod_levels(tile) or [0]:
         prim = mesh_at(tile, channel_id, level)
@@ -199,7 +199,7 @@ def count_faces(mesh: Usd.Prim) -> int:
 
 
 def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
-    """Select a level of a tile and return its mesh; None: no mesh is drawn."""
+    """Select a tile's level of detail, and return a channel's mesh; None: no mesh is drawn."""
     if lod_levels(tile):
         select_variant(tile, "lod", f"lod{level}")
     prim = drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}"))

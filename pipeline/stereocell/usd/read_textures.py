@@ -28,7 +28,7 @@ class ComposedMaps:
 
     @property
     def any(self) -> bool:
-        """Whether there is any map."""
+        """Whether the surface has at least one map."""
         return bool(self.files)
 
 

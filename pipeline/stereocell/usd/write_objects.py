@@ -82,7 +82,7 @@ def define_objects(
     table: ObjectTable,
     touching: SharedInterfaces | None,
 ) -> None:
-    """Write the data of objects that all levels share: labels, names, interfaces, class materials.
+    """Write the objects' data for all levels of detail: labels, names, interfaces, classes.
 
     look      path of the mesh's material; those of the classes stand beside it
     touching  interfaces of these objects; None: not known

@@ -164,7 +164,7 @@ def _write_files(folder: Path, tile: TileContent, channel: ChannelContent, has_v
 
 
 def _images(channel: ChannelContent, lod: Lod) -> Iterator[tuple[Kind, NDArray[np.uint8]]]:
-    """Yield the maps of a level that has UVs: uint8, (h, w, 3) or (h, w)."""
+    """Yield the baked maps of a level of detail with UVs: uint8, (h, w, 3) or (h, w)."""
     if lod.normal_map is None:
         return
     yield "normal", lod.normal_map
@@ -257,7 +257,7 @@ def _define_fields(volume: UsdVol.Volume, channel: ChannelContent) -> None:
 
 
 def _author_lods(root: Usd.Prim, tile: TileContent) -> None:
-    """Write each level's geometry into a variant. A channel with fewer levels repeats its last."""
+    """Write each level's geometry into a variant. A channel with fewer repeats its coarsest."""
     count = max((len(channel.lods) for channel in tile.channels), default=0)
     if count == 0:
         return

@@ -162,7 +162,7 @@ def _count_triangles(tile: Usd.Prim, channels: Collection[str], level: int) -> i
 def _read_parts(
     stage: Usd.Stage, prims: list[Usd.Prim], channels: Collection[str], level: int
 ) -> Iterator[_Part]:
-    """Yield each drawn mesh that has triangles, at a level or else the next finer one it has."""
+    """Yield each drawn mesh with triangles, at a level of detail or else the next finer one."""
     for name in [str(prim.GetName()) for prim in prims]:
         with loaded(stage, name) as (tile, _):
             for channel in channels:

@@ -40,7 +40,7 @@ ADVICE = "put edits into a layer of your own over the stage"
 
 
 def write_list(stage_dir: Path, tiles: FileList, *others: Path) -> None:
-    """Write files.json: the given entries of `tiles`, and new entries for the files at `others`."""
+    """Write files.json: the entries `tiles`, and entries for files and folders `others`."""
     listed = {**tiles, **list_files(*others, root=stage_dir)}
     write_bytes(stage_dir / FILES, encode(listed))
 

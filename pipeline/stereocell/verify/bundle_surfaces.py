@@ -50,7 +50,7 @@ _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
 
 
 def without_repeats(lods: Sequence[ComposedLod]) -> Iterator[tuple[int, ComposedLod]]:
-    """Yield the levels that a bundle contains: of successive equal levels only the finest."""
+    """Yield the levels of detail in a bundle: the finest of several equal successive ones."""
     last: ComposedLod | None = None
     for lod in lods:
         if last is None or not _are_alike(last, lod):
@@ -74,7 +74,7 @@ def _are_alike(one: ComposedLod, other: ComposedLod) -> bool:
 def surfaces_of(
     bundle: Path, channel: dict[str, Any], tile_id: str
 ) -> Iterator[tuple[int, Content]]:
-    """Yield a tile's surfaces in a channel's tileset, by level."""
+    """Yield a tile's surfaces in a channel's tileset, each with its level of detail."""
     if channel["tileset"] is None:
         return
     for content in walk(bundle, bundle / channel["tileset"]["path"], tile_id):
@@ -215,7 +215,7 @@ def _compare_faces(
     drawn: DecodedMesh,
     mesh: Mesh,
 ) -> Iterator[str]:
-    """Yield problems with the facing of triangles, and with their place in the maps.
+    """Yield problems with the facing of triangles, and with their texture coordinates.
 
     there, here  corners (n, 3, 3) of the stage's and of the bundle's triangles, m
     """

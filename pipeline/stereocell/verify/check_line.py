@@ -9,7 +9,7 @@ _MAX_SHOWN = 3  # problems printed in one line
 
 @dataclass(frozen=True, slots=True)
 class CheckLine:
-    """One line of the result.
+    """One line of the result of a check.
 
     detail  the parts that were checked, or the problem
     """

@@ -77,7 +77,7 @@ class SourceTask:
 
 @dataclass(frozen=True, slots=True)
 class UnitFinding:
-    """The result of one unit.
+    """The result of comparing one unit (a channel in a tile).
 
     levels  of each level, um: the distance that the stage states, and the distance (99th
             percentile) and the largest distance that were found
@@ -139,7 +139,7 @@ class _Surfaces:
         self._known: dict[int, Nearest] = {}
 
     def at(self, level: int) -> Nearest:
-        """Return the reference of a level."""
+        """Return the reference surface of a level of detail."""
         error = self._errors[min(level, len(self._errors) - 1)] * self._spacing
         gone = self._bodies.find(error)
         key = int(
