@@ -60,7 +60,10 @@ def check_volume_lists(bundle: Path) -> str:
 
 
 def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
-    """Return offset and length in bytes of a KTX2 file's mip levels; empty without `count` levels."""
+    """Return the offset and the length, in bytes, of each mip level of a KTX2 file.
+
+    The list is empty if the file does not have `count` mip levels.
+    """
     try:
         with texture.open("rb") as file:
             head = file.read(80 + 24 * count)
