@@ -427,7 +427,10 @@ def _options(stage: Usd.Stage) -> _Options:
 
 
 def _read_options(kind: type[T], content: Mapping[str, Any], where: str) -> T:
-    """Return options from a section of settings. Ignores unknown keys. Raises StageError."""
+    """Return options from a section of settings, without unknown keys.
+
+    Raises StageError for an invalid value, with `where` and the value's name.
+    """
     known = {field.name for field in fields(kind)}  # type: ignore[arg-type]
     values = {
         key: json.loads(value) if isinstance(value, str) and value.startswith("[") else value

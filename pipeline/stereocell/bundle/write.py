@@ -218,7 +218,7 @@ def views_of(stage: Usd.Stage) -> list[StageView]:
 def lights_of(composed: Composed) -> StageLights | None:
     """Return the lights that a user's layers edit or add; None: the viewer uses its own lamps.
 
-    Raises StageError.
+    Raises StageError for values over time, and for an image that can't be read.
     """
     require = composed.as_written.require
     return read_lights(composed.stage, *_box_of(composed.stage), require)

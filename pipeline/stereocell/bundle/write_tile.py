@@ -107,7 +107,7 @@ def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tup
 
     Without volumes, these are the corners of the tile's extentsHint.
 
-    Raises StageError.
+    Raises StageError if the hint is missing or invalid.
     """
     boxes = [
         move_box(np.array(volume.low), np.array(volume.high), volume.matrix)

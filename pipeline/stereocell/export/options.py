@@ -76,7 +76,7 @@ class ExportOptions:
 def parse_region(text: str) -> Region:
     """Return the box of a text `x0:x1,y0:y1,z0:z1` in um; an empty end is infinite.
 
-    Raises UsageError.
+    Raises UsageError for other text, or a first end that is not less than the second.
     """
     ends = [pair.partition(":") for pair in text.split(",")]
     try:

@@ -60,7 +60,7 @@ class Table:
     """A tree without its bricks: header and node records.
 
     size         texels (z, y, x)
-    threshold    see voxel_bvh.Bvh
+    threshold    largest invisible intensity, 0..254; -1: all texels are visible
     source       first 128 bits of the SHA-256 of the volume's KTX2 file
     nodes        records of RECORD (n,): the fields of voxel_bvh.NODE, and `length` (bytes) and
                  `hash` of the brick's zstd frame, zeros in empty nodes

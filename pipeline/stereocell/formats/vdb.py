@@ -90,11 +90,11 @@ def write_vdb(
     """Write a file with the grid `density`, which is `density` / 255, and maybe `measured`.
 
     density     uint8 (z, y, x), image rows downwards
-    first_um    centre of its voxel (0, 0, 0), (z, y, x)
-    spacing_um  (z, y, x)
+    first_um    centre of voxel (0, 0, 0) of `density`, (z, y, x)
+    spacing_um  voxel spacing (z, y, x)
     measured    (z, y, x), numbers that float32 can hold. It has `apron` voxels more than the
                 density at the start of each axis, and any number at the end
-    apron       see `measured`
+    apron       number of voxels by which `measured` begins before `density`
 
     Grid index (i, j, k) is world (x, y, z), in both grids. Rows are reversed, so that j grows
     upwards like the world's y, and the transform has only positive scales: some clients treat a

@@ -97,8 +97,8 @@ class FineVolumes:
     """The volumes of a fine mesh's bodies, for levels whose vertices are a part of its vertices.
 
     planes    the cut planes
-    box       of the tile; None: vertices may move anywhere
-    topology  of the mesh; None: it is computed
+    box       box of the tile, which vertices do not leave; None: vertices may move anywhere
+    topology  topology of the mesh; None: it is computed
     caps      planes of caps, which stay flat
     """
 
@@ -146,7 +146,7 @@ class FineVolumes:
 
         vertices     int64 (n,), index of each vertex in the fine mesh
         max_move_um  largest distance of a move
-        topology     of the level; None: it is computed
+        topology     topology of the level's mesh; None: it is computed
         earlier      an earlier result, valid for all bodies that have not changed
         """
         planes = self._planes

@@ -38,7 +38,7 @@ Triangles = NDArray[np.uint32]
 class Simplified:
     """A simplified mesh without defects.
 
-    topology          of the mesh
+    topology          topology of the simplified mesh
     vertices          int64 (k,), index of each vertex in the given mesh, rising
     changed           bool (k,), vertices of bodies that were simplified in this call
     simplified_again  number of bodies that were simplified more than once
@@ -65,7 +65,7 @@ class Simplifier:
 
     mesh      positions float32 (n, 3) in um, triangles uint32 (m, 3)
     planes    the cut planes, where the mesh may be open
-    topology  of the mesh; None: it is computed
+    topology  topology of the mesh; None: it is computed
     caps      planes of caps, which stay flat
 
     Bodies with defects in the given mesh stay as they are.
@@ -94,7 +94,7 @@ class Simplifier:
     def simplify(self, max_error_um: float, bodies: NDArray[np.bool_] | None = None) -> Simplified:
         """Return the mesh simplified and without defects. Boundary edges stay.
 
-        max_error_um  see `simplify`
+        max_error_um  largest error of a vertex, um, see `simplify.simplify`
         bodies        bool (b,), the bodies that are simplified; None: all. The others stay as after
                       the last call, unless simplified ones cross them.
         """

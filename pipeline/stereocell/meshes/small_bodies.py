@@ -35,7 +35,7 @@ class SmallBodies:
     def find(self, error_um: float) -> NDArray[np.bool_]:
         """Return which vertices of the surface belong to removed bodies, bool (n,).
 
-        error_um  error of the level
+        error_um  largest error of the level of detail
         """
         small = (self._diagonals < SMALL * error_um) & (self._areas > 0) & ~self._is_open
         order = np.flatnonzero(small)

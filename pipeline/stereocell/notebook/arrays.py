@@ -235,7 +235,10 @@ def _mean(part: NDArray[Any], blocks: tuple[int, int, int]) -> NDArray[Any]:
 
 
 def _as_stored(voxels: NDArray[Any]) -> NDArray[Any]:
-    """Convert voxels to a type that OME-TIFF can store and a build can read. Raises UsageError."""
+    """Convert voxels to a type that OME-TIFF can store and a build can read.
+
+    Raises UsageError if no value is finite.
+    """
     if voxels.dtype.kind == "b":
         return voxels.astype(np.uint8)
     if voxels.dtype.kind == "f":

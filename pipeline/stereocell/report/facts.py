@@ -30,7 +30,7 @@ class LodFacts:
 
     distance_um  99th percentile of the distance between mesh and iso-surface
     bytes        size of the .glb in the bundle, or else of the unit's own file
-    mean_um, p95_um, max_um  the same distance: mean, 95th percentile, largest
+    mean_um, p95_um, max_um  mean, 95th percentile and largest distance between these two
     faults       defects that the exact check found
     fallbacks    components left as in the finer level, because simplifying made defects
     angle_deg    1st percentile of the triangles' smallest angles

@@ -56,8 +56,8 @@ def make_levels(
 
     fine          positions float32 (n, 3) in um, world space (x, y, z)
     planes        the cut planes
-    spacing_um    of the voxels, (z, y, x)
-    box           of the tile, least and largest corner (x, y, z), um; vertices do not leave it
+    spacing_um    voxel spacing (z, y, x)
+    box           box of the tile, least and largest corner (x, y, z), um; vertices do not leave it
     caps          planes of caps, which stay flat
     get_texturer  None: levels get no values
     first         number of the first level that is made; `fine` is then the level before it
@@ -139,9 +139,9 @@ def _simplify(
 ) -> tuple[Simplified, RestoredLevel]:
     """Return a simplified level, and the same level with its volumes.
 
-    simplifier  of the level before
-    topology    of the level before
-    number      index of each of its vertices in the fine mesh
+    simplifier  holds the next finer level, which it simplifies
+    topology    topology of the next finer level
+    number      index of each vertex of the next finer level in the fine mesh
     """
     with clock("simplify"):
         simplified = simplifier.simplify(error_um)

@@ -25,7 +25,7 @@ class BiasField:
 
     shape    (z, y, x), voxels
     terms    degrees (z, y, x) of each product
-    weights  of the products, in log intensity
+    weights  weight of each product, in log intensity
     """
 
     shape: tuple[int, int, int]

@@ -70,7 +70,10 @@ class _SumsTask:
 
 
 def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> str:
-    """Compare a label map's objects with the source; return a line on them. Raises CheckError."""
+    """Compare a label map's objects with the source; return a line on the compared parts.
+
+    Raises CheckError if they differ.
+    """
     boxes = tile_boxes(TileGrid.of(plan, labels))
     steps = [
         (f"{tile}/{labels.name}", FindExtents(labels.voxels, box)) for tile, box in boxes.items()
