@@ -112,7 +112,7 @@ def describe_channel(
 ) -> dict[str, Any]:
     """Return a channel's entry in the manifest.
 
-    triangles  for each tile, the number of triangles of each level
+    triangles  for each tile, the number of triangles at each level of detail
     distances  for each tile, the 99th percentile and the largest distance of each level, um
     """
     return {

@@ -86,7 +86,7 @@ class Shown:
 def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
     """Return a channel's levels in a loaded tile, without those finer than `finest`.
 
-    finest  finest level to return; 0: all levels
+    finest  finest level of detail to return; 0: all levels
 
     Raises StageError if a mesh can't be drawn, or has a point that is not finite.
     """
@@ -122,8 +122,8 @@ def _follow(
 ) -> tuple[list[ComposedLod], list[str]]:
     """Return all levels, with new coarser ones if needed, and remarks about the edits.
 
-    lods    levels as they are composed, finest first
-    edited  levels that were edited
+    lods    levels of detail as they are composed, finest first
+    edited  numbers of the levels that were edited
     """
     fine, options = lods[0], _options(tile.GetStage())
     planes = _cut_planes(tile, channel_id, fine)
@@ -241,7 +241,7 @@ def _compose(
     lod     the level before the edit
     fine    the edited finest level
     source  mesh of `fine` with values at vertices
-    others  sample the green and the blue component of the colours
+    others  look up the green and the blue component of the colours of `fine`
     """
     mesh, baked = made.mesh, made.baked
     assert baked is not None

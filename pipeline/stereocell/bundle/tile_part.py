@@ -89,7 +89,7 @@ class BundleTile:
     """One tile in the bundle.
 
     low      lower corner (x, y, z) of the tile's box, world um
-    high     upper corner
+    high     upper corner of the box, like `low`
     changed  paths of the tile's layers that differ from the stage's list, relative to the stage
     name     display name; empty: none
     """

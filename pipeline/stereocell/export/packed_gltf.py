@@ -30,7 +30,7 @@ _DRACO_TYPES = {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2}  # GeometryAttribute::
 def packed_buffers(name: str, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> Buffers:
     """Return the buffers that compress meshes by one of the two extensions.
 
-    name           `meshopt` or `draco`
+    name           name of the compression, `meshopt` or `draco`
     low_m, high_m  corners (x, y, z) of the specimen's box, metres
 
     Raises UsageError if the library is not installed.

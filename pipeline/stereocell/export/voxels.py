@@ -254,7 +254,7 @@ def _cut(
     may be, this is the smallest box of the lattice around the region.
 
     start, steps  position of the lattice's (0, 0, 0), and its steps as rows, world um
-    first, end    voxels of all tiles on the lattice
+    first, end    first voxel and end (x, y, z) of all tiles on the lattice
     """
     if region is None:
         return first, end

@@ -56,7 +56,7 @@ class Format:
     is_seen      whether the format is for viewing; then, without --channels, it has the channels
                  that the viewer shows at opening
     names_files  whether the file refers to files of OUT by path, so that OUT must be a local folder
-    beside       returns the paths of files that belong to the file
+    beside       returns the paths of further files that are written beside the file
     """
 
     write: Callable[[Chosen, Path, int], str]

@@ -41,7 +41,7 @@ def find_background(
     """Return the background of a channel, in voxel values.
 
     field       (z, y, x), voxel values, covering `region` at any resolution
-    region      voxels of the level that is built
+    region      box of the dataset that is built, in voxels of the built resolution level
     spacing_um  (z, y, x), of the region's level
     block_um    approximate edge of a block; knots lie at the blocks' centres and at the ends
     padding     bool (z, y, x), voxels of the field that are left out; None: none are

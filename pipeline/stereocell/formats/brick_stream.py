@@ -64,7 +64,7 @@ class Table:
     source       first 128 bits of the SHA-256 of the volume's KTX2 file
     nodes        records of RECORD (n,): the fields of voxel_bvh.NODE, and `length` (bytes) and
                  `hash` of the brick's zstd frame, zeros in empty nodes
-    brick_bytes  length of all frames together
+    brick_bytes  length of all zstd frames of bricks together
     """
 
     size: tuple[int, int, int]
@@ -98,7 +98,7 @@ class Frame:
     """A binary frame.
 
     kind      TABLE_FRAME or BRICKS_FRAME
-    sequence  number of the frame
+    sequence  number of the frame in the connection
     view      ID that the client gave the view whose bricks the frame holds; 0 for tables
     parts     content, one part after the other
     """

@@ -119,7 +119,7 @@ def encode_glb(
 
     mesh      positions float32 (n, 3) in um (x, y, z), triangles uint32 (m, 3), normals
     step_m    step of the lattice in metres, see `choose_step`
-    extras    written on the only node
+    extras    texts for the `extras` of the file's only node
     textures  UVs are written only if there is a map, and tangents only if it is a normal map
     features  table of the tile's objects, in the order of their numbers; None: no table is written
 

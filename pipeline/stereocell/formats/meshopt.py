@@ -72,7 +72,7 @@ class CompressedBuffers:
         """Store one row per vertex; return the accessor's index.
 
         values    (n, k), rows of 4, 8, ... bytes
-        accessor  its glTF properties without the count
+        accessor  glTF properties of the accessor, without the count
         """
         count, stride = len(values), values.itemsize * values.shape[1]
         # The extension requires version 0 of the vertex codec.

@@ -144,7 +144,7 @@ def build(volume: Bytes3, threshold: int) -> Bvh:
 def upsampling(level: int, count: int) -> Floats:
     """Return the weights that interpolate a brick's row at finest texel centres.
 
-    level   level of the brick
+    level   level of the brick's node, 0: a leaf
     count   finest texels along the box's axis
     result  float32 (count, 18)
 

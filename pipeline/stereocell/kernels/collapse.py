@@ -269,7 +269,7 @@ def find_costs(mesh: Mesh, work: Work) -> None:
 def try_collapse(u: int, limit: int, mesh: Mesh, work: Work, limits: Limits) -> int:
     """Move u onto its cheapest neighbour for which the collapse is allowed.
 
-    limit  highest class of cost
+    limit  highest class of cost that is allowed now
     result this neighbour, or -1 if there is none
     """
     ring, costs = work.ring, work.costs

@@ -62,7 +62,7 @@ def mark_fan(u: int, mesh: Mesh, marks: Flags) -> None:
 def check_fan_link(mesh: Mesh, ring: Ring, chosen: int) -> bool:
     """Return whether an edge's ends have two common neighbours, and at most VALENCE in all.
 
-    ring    stamped, see `stamp_fan`
+    ring    ring whose neighbours are stamped, see `stamp_fan`
     chosen  number of the edge's far end among the neighbours
     """
     common, others = count_common(ring.out[chosen], mesh.edges, ring.stamp, ring.sizes[STAMP])

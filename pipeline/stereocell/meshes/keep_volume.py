@@ -61,7 +61,7 @@ Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
 class RestoredLevel:
     """A level of detail whose bodies have their volumes back, as far as possible.
 
-    defects  remaining defects
+    defects  defects that remain in the mesh
     lacks    bool (n,), vertices of bodies whose volume is off by more than MAX_VOLUME_ERROR; all
              False if MANY vertices crossed
     moves    float64 (n, 3), moves of the vertices
@@ -215,7 +215,7 @@ class FineVolumes:
 
         start   float64 (n, 3), positions before the move
         bodies  body of each vertex, and the number of bodies
-        wanted  volumes of the bodies
+        wanted  volumes that the bodies should have, um^3
         share   share of the move that each vertex makes
         """
         label, count = bodies

@@ -35,7 +35,7 @@ class LabelEvidence:
     """The evidence in an array on whether it holds labels.
 
     kind    mask: the array has only two values
-    values  number of values without 0
+    values  number of different values, without 0
     pieces  number of connected components of equal voxels, without 0 and an image's even ground
     """
 

@@ -63,7 +63,7 @@ class Published:
 class _File:
     """A file of the bundle, or a compressed copy of one.
 
-    entry  bytes and sha256
+    entry  size (`bytes`) and hash (`sha256`) of the content
     """
 
     entry: Mapping[str, Any]

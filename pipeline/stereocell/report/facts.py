@@ -30,9 +30,9 @@ class LodFacts:
 
     distance_um  99th percentile of the distance between mesh and iso-surface
     bytes        size of the .glb in the bundle, or else of the unit's own file
-    mean_um, p95_um, max_um  mean, 95th percentile and largest distance between these two
-    faults       defects that the exact check found
-    fallbacks    components left as in the finer level, because simplifying made defects
+    mean_um, p95_um, max_um  mean, 95th percentile and maximum of this distance
+    faults       number of defects that the exact check of the mesh found
+    fallbacks    number of components left as in the finer level, since simplifying made defects
     angle_deg    1st percentile of the triangles' smallest angles
     enclosed     share of the finest surface inside this level or on it, 0..1
 
@@ -55,7 +55,7 @@ class LodFacts:
 class UnitFacts:
     """One finished (tile, channel).
 
-    directory   folder of its results
+    directory   folder of the unit's results
     iso_value   voxel value above the background; None: the channel has none
     background  mean of the subtracted background over the tile, voxel values; 0: none
     confidence  0..1, of the iso-value in this tile alone; None: the tile holds no structure

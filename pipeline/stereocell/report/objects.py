@@ -15,7 +15,7 @@ class ObjectLevel:
 
     distance_um, farthest_um  distance from the faces between voxels, um: 99th percentile, largest
     bias   largest relative error of an object's volume, compared with its voxels
-    bytes  size of the .glb files in the bundle
+    bytes  size of this level's .glb files in the bundle
     """
 
     triangles: int
@@ -34,7 +34,7 @@ class LabelFacts:
     pieces   number of further pieces, into which the planes between tiles cut objects
     changed  voxels that were changed, so that no object touches itself at an edge or a corner
     stopped  notes on objects whose simplification stopped early
-    units    folders of its units that have a surface
+    units    folders of the label map's units that have a surface
     """
 
     name: str

@@ -31,7 +31,7 @@ def find_opening(
 ) -> Opening:
     """Return the opening of a build's report.
 
-    covers       by the name of each channel with a surface
+    covers       how surfaces cover the source's voxels, by the name of each channel with one
     with_others  names of the channels for which the page shows other iso-values
     """
     look_first, anchor = _look_first(facts, covers, with_others)

@@ -39,8 +39,8 @@ _LI_VOXELS = 200_000  # approximate number of voxels that represent the counts i
 class Row:
     """One threshold.
 
-    kind   CSS class of its line
-    value  voxel value
+    kind   CSS class of the threshold's line in the chart
+    value  the threshold as a voxel value
     above  share of the voxels above it, 0..1
     """
 

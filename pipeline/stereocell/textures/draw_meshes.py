@@ -85,7 +85,7 @@ def draw_pixels(
 def draw_side(shapes: Iterable[Shape], box: Box, axes: Vector, longest: int) -> NDArray[np.uint8]:
     """Return an image of meshes (h, w, 4) on a transparent ground, in parallel projection.
 
-    box      fills the image
+    box      box (corners x, y, z, world um) whose projection fills the image
     axes     (3, 3), columns are directions in the world: right, up, and to the eye
     longest  number of pixels of the longer edge
     """

@@ -147,7 +147,7 @@ def _weigh(
 
     For a point beyond a corner, that is less than its distance from the corner.
 
-    frames  (10, n), numbers of each point's triangle
+    frames  (10, n), numbers of each point's triangle, from `_frames`
     """
     ax, ay, abx, aby, acx, acy, twice, *heights = frames
     x, y = x - ax, y - ay

@@ -37,8 +37,8 @@ class Texturer:
 
     The vertices of a coarser level are a part of the finest level's vertices.
 
-    options     resolved
-    values      at the vertices of the finest level
+    options     options whose `auto` lengths are replaced, see `UnwrapOptions.resolved`
+    values      values at the vertices of the finest level
     get_source  returns the surface from which maps are baked; called only if maps are requested
     """
 

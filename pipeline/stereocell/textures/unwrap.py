@@ -73,7 +73,7 @@ def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
     """Return the mesh with UVs, or the reason why it has none: too many triangles or charts.
 
     mesh     positions float32 (n, 3) in um, triangles uint32 (m, 3); its normals do not change
-    options  resolved
+    options  options whose `auto` lengths are replaced, see `UnwrapOptions.resolved`
 
     Raises UsageError without xatlas, which is a package of the extra `maps`.
 

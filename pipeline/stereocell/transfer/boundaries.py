@@ -130,7 +130,7 @@ def find_boundaries(
     """Return materials and boundaries of a histogram.
 
     counts        int64 (rows, columns), voxels by gradient magnitude and value; see count_joint
-    gradient_max  gradient magnitude of the last row
+    gradient_max  gradient magnitude that the histogram's last row stands for
     spacing_um    (z, y, x); only the ratios matter
 
     The same histogram always gives the same answer. A constant volume, or one of a single material,
@@ -196,10 +196,10 @@ class _EdgeSum:
     """The voxels above the noise, as a sum whose terms are to be found.
 
     matrix  (cells, terms): voxels from each boundary, and then each material; weighted
-    cells   (cells,): counted voxels; weighted
+    cells   (cells,): voxels counted in each cell of the histogram; weighted
     pairs   (boundaries,): the pair of materials of each boundary
-    blurs   (boundaries,): in finest voxels
-    seen    (boundaries,): voxels above the noise for an amount of 1
+    blurs   (boundaries,): sigma of each boundary's blur, in finest voxels
+    seen    (boundaries,): voxels above the noise, for each voxel of the edge's area
     """
 
     matrix: NDArray[np.float64]

@@ -38,7 +38,7 @@ class ComposedAppearance:
     surface_reason  why there is no surface, or why it is uncertain; else empty
     level           iso-value, background and smoothing of the surface; None: not stated
     chosen          name of the selected transfer function
-    transfer_2d     the two-dimensional transfer functions
+    transfer_2d     two-dimensional transfer functions, and their scale of gradients
     threshold       voxel value at which the specimen begins; None: not known
     opens           whether the channel is visible when the specimen is opened
     """

@@ -105,7 +105,7 @@ def require_no_lost_edit(
 ) -> None:
     """Raise StageError if an edit is lost, or if the stage is flattened, which hides its edits.
 
-    more   lines on edits that are lost in part
+    more   messages on edits that are lost in part
     taker  words of the message after "edits that"
     """
     layer, built = Path(stage.GetRootLayer().realPath), BuiltLayers(stage)

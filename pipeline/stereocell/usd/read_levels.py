@@ -58,14 +58,14 @@ class MadeMaps:
 class ComposedLod:
     """A channel's surface in one tile at one level of detail, in world um.
 
-    level        0 is the finest level
+    level        level of detail, 0: the finest
     distance_um  99th percentile of the distances between mesh and iso-surface, both ways, um
     largest_um   largest of these distances, um; equal to `distance_um` in stages of earlier
                  versions, which do not state it
     matrix       (4, 4) for row vectors, from the mesh's own space to world um
     shape        hash of the composed points and faces; empty if `built` is empty
     built        hash of the points and faces that the build wrote; empty: the stage has no hash
-    own          the 16 numbers of the transform on the mesh's prim
+    own          the 16 numbers, row by row, of the matrix (4, 4) that the mesh's own prim states
     lost         values that an edit of the faces made invalid: `maps`, `occlusion`, `colours`
     images       maps in memory, if the level was computed again: see bundle/edited_meshes.py
     """

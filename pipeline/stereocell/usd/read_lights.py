@@ -57,7 +57,7 @@ INPUTS = (
 class StageLamp:
     """A lamp of the viewer.
 
-    color     linear RGB; the largest part is 1
+    color     linear RGB; the largest of the three is 1
     strength  radiance of a white surface that the lamp lights, see the module's docstring
     towards   unit vector (x, y, z) to a distant lamp, world; None for a sphere
     position  place of a sphere, um, world; None for a distant lamp

@@ -14,7 +14,7 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
     """Return every file of a stage: layers, also those of unselected variants, and assets.
 
     path       layer to open, which may be an artist's layer over a stage
-    stage_dir  folder of the stage
+    stage_dir  folder of the stage that the build wrote
 
     Only files in the folder of `path`, in `stage_dir` or below are opened. Raises StageError for a
     file outside them. Layers that can't be opened are not searched: `open_stage` reports them.

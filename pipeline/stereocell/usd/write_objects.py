@@ -117,7 +117,7 @@ def write_objects(
 ) -> None:
     """Write the objects of one level: columns, colours and classes, as primvars and GeomSubsets.
 
-    made  mesh before its seams were joined
+    made  mesh as built, with vertices that are split along the seams of its UVs
     kept  indices of the vertices of `made` that are points of `mesh`
     """
     assert made.objects is not None
