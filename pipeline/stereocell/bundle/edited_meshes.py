@@ -324,7 +324,7 @@ def with_vertex_occlusion(lod: ComposedLod) -> Mesh:
 
 
 def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
-    """Return the mesh and its defects.
+    """Return a mesh, with vertices joined if that removes defects, and its defects.
 
     Seams of UVs or normals count as open edges. So vertices at the same position are joined if the
     mesh then has fewer defects.

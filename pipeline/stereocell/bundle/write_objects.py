@@ -149,7 +149,7 @@ def _quantize(values: NDArray[np.float32]) -> tuple[NDArray[np.uint8], dict[str,
 def _neighbours(
     interfaces: NDArray[np.int32], count: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.int64]]:
-    """Return the neighbours of each row as a flat list.
+    """Return, as a flat list, the rows of the objects that touch each row's object.
 
     Returns the index of each row's first neighbour (count + 1,), all neighbours (2 m,), ascending
     within a row, and an order (2 m,). The order sorts two copies of the interfaces, one after the

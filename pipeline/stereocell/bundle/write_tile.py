@@ -54,7 +54,7 @@ def write_tile(
     appearances: tuple[ComposedAppearance, ...],
     step_m: float,
 ) -> None:
-    """Write the part of one tile.
+    """Write the part of a bundle for one tile.
 
     part    folder of the part, whose name is the tile's ID
     step_m  step of the lattice for vertices, metres, see formats/gltf.py

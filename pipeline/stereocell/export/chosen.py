@@ -37,7 +37,7 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """The surface of a channel in a tile.
+    """The surface of a channel in a tile, as read for an export.
 
     mesh     in world um; values of maps are stored at its vertices
     objects  objects of a label map's tile, which `mesh.objects` refers to

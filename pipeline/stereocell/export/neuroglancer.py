@@ -83,7 +83,7 @@ def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
 
 @dataclass(slots=True)
 class _Found:
-    """The surfaces of a channel.
+    """The surfaces of a channel in all tiles and at all levels of detail.
 
     surfaces  by segment ID, for each level the surfaces of all tiles; the ID is 0 if the channel is
               not a label map
@@ -156,7 +156,7 @@ def _resolution(layout: Layout) -> tuple[float, float, float]:
 
 
 def _write_image(folder: Path, chosen: Chosen, layout: Layout) -> int:
-    """Write the image; return the number of its scales.
+    """Write the image of all channels; return the number of its scales (resolution levels).
 
     Each scale is computed from the one before. They are stored in temporary files.
     """

@@ -138,7 +138,7 @@ def _handy(chosen: Chosen) -> float:
 def _solids(
     chosen: Chosen, level: int, *, is_one: bool
 ) -> Iterator[tuple[_Part, manifold3d.Manifold]]:
-    """Yield each part with its solid.
+    """Yield each channel, or object of a label map, with its solid.
 
     is_one  whether all channels become one solid
     """

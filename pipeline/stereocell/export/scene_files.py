@@ -27,7 +27,7 @@ _NO_USDZ = "a scene in one file has none"
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """The bytes of a file, as gzip or unchanged."""
+    """The bytes of a file for a scene in one file, as gzip or unchanged."""
 
     data: bytes
     is_packed: bool

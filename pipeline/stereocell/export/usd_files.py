@@ -24,7 +24,7 @@ from stereocell.usd.write_usdz import SIZE_M, write_usdz
 
 
 def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
-    """Write .usdz; return a sentence about it."""
+    """Write a small copy for AR viewers as .usdz; return a sentence about it."""
     channels = [channel.id for channel in chosen.channels]
     tiles = chosen.tiles
     scale = chosen.options.scale

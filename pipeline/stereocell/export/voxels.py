@@ -34,7 +34,7 @@ _BLOCK = 1 << 20  # bytes of zeros that are written at a time
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The content of a file with a volume.
+    """The layout of a file with a volume: its lattice, channels and type of voxels.
 
     grid         size, spacing, origin and direction of the volume
     dtype        type of the voxels in the file
@@ -66,7 +66,7 @@ class Layout:
 
     @property
     def about(self) -> str:
-        """A phrase about size, type, channels and values."""
+        """A phrase about size, type, channels and values of the volume, for the user."""
         x, y, z = self.grid.size
         if self.is_measured:
             values = "the source's values"

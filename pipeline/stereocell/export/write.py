@@ -45,7 +45,7 @@ _LEVELS = frozenset({"strict", "tiles", "lod", "max_triangles", "max_bytes", "re
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How the files of an ending are written.
+    """One file format of `export`: how files with its ending are written.
 
     write        writes the file at a level of detail (0 if the format has no levels), and returns a
                  sentence about the file

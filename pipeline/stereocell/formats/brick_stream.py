@@ -95,7 +95,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A binary frame.
+    """A binary message that the server sends: tables or bricks of trees.
 
     kind      TABLE_FRAME or BRICKS_FRAME
     sequence  number of the frame in the connection

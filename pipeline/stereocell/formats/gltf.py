@@ -115,7 +115,7 @@ def encode_glb(
     textures: Textures | None = None,
     features: Features | None = None,
 ) -> Glb:
-    """Return the mesh as .glb.
+    """Return a mesh as the content of a .glb file.
 
     mesh      positions float32 (n, 3) in um (x, y, z), triangles uint32 (m, 3), normals
     step_m    step of the lattice in metres, see `choose_step`

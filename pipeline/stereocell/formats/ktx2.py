@@ -55,7 +55,7 @@ class Ktx2:
 
 
 def encode_3d(levels: Sequence[NDArray[np.uint8]]) -> Ktx2:
-    """Return a 3D texture.
+    """Return a 3D texture with its mip levels as a KTX2 file.
 
     levels  finest first, each uint8 (z, y, x) or (z, y, x, components). Components: 1 (R8),
             2 (R8G8) or 4 (R8G8B8A8), UNORM
@@ -73,7 +73,7 @@ def encode_3d(levels: Sequence[NDArray[np.uint8]]) -> Ktx2:
 
 
 def encode_2d(image: NDArray[np.uint8]) -> Ktx2:
-    """Return a 2D texture of one level.
+    """Return a 2D texture of one mip level as a KTX2 file.
 
     image  uint8 (y, x, components), row 0 first
     """

@@ -48,7 +48,7 @@ def write_info(folder: Path, content: dict[str, Any]) -> None:
 def write_volume(
     folder: Path, scales: Sequence[tuple[NDArray[Any], tuple[float, float, float]]]
 ) -> None:
-    """Write an image.
+    """Write an image as chunks of voxels, at one or more resolution levels.
 
     scales  finest first: voxels (channel, z, y, x), and the voxel spacing (x, y, z) in nm
     """

@@ -65,7 +65,7 @@ _Leaves = tuple[NDArray[Any], NDArray[np.int64]]
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """A grid to write.
+    """A grid of an OpenVDB file that is to be written.
 
     voxels  (x, y, z), the grid's numbers; uint8 if `is_half`
     first   index (i, j, k) of the first voxel

@@ -53,7 +53,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class Bvh:
-    """The tree of one volume.
+    """The octree of bricks over one volume.
 
     size       texels (z, y, x) of the volume, with the apron
     threshold  largest invisible intensity, 0..254; -1: all texels are visible
@@ -81,7 +81,7 @@ class Bvh:
 
 
 def build(volume: Bytes3, threshold: int) -> Bvh:
-    """Return the tree of a volume.
+    """Return the octree of bricks over a volume.
 
     volume     uint8 (z, y, x)
     threshold  largest invisible intensity, 0..254; -1: all texels are visible

@@ -76,7 +76,7 @@ BLOCK = 4096  # number of vertices, near one another, that are processed togethe
 
 
 class Limits(NamedTuple):
-    """How far a collapse may go."""
+    """The bounds that a collapse must keep, and the number of vertices in a block."""
 
     # Largest distance of a vertex from the result, summed over collapses; multiple of its error
     stray: float

@@ -48,7 +48,7 @@ def stamp_fan(ring: Ring) -> None:
 
 @step
 def mark_fan(u: int, mesh: Mesh, marks: Flags) -> None:
-    """Mark all neighbours of u, which is not on a border."""
+    """Set the marks of all neighbours of the vertex u, which is not on a border, to True."""
     start = mesh.start[u]
     h = start
     while True:

@@ -82,7 +82,7 @@ def measure_enclosure(source: Nearest, target: Nearest) -> float:
 
 
 def measure_spread(source: Nearest, target: Nearest) -> Spread:
-    """Return the distances in um from one mesh to the other.
+    """Return statistics of the distances, um, from one mesh to the other.
 
     Mean and percentiles are over the source's area. The maximum is also over its vertices, of which
     about VERTICES are measured, spread evenly over their order.

@@ -142,7 +142,7 @@ class FineVolumes:
         topology: Topology | None = None,
         earlier: EarlierLevel | None = None,
     ) -> RestoredLevel:
-        """Return a level with the volumes of the fine bodies.
+        """Return a level of detail whose bodies have the volumes of the fine mesh's bodies.
 
         vertices     int64 (n,), index of each vertex in the fine mesh
         max_move_um  largest distance of a move

@@ -44,7 +44,7 @@ class ArraySource:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """The shape as (c, z, y, x)."""
+        """The array's shape as (c, z, y, x), with one channel for an array (z, y, x)."""
         shape = tuple(int(n) for n in self.data.shape)
         return (1, *shape) if len(shape) == 3 else shape  # type: ignore[return-value]
 

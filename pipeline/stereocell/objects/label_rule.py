@@ -32,7 +32,7 @@ _NO_LABELS = 0.5  # share of equal pairs below which components are not examined
 
 @dataclass(frozen=True, slots=True)
 class LabelEvidence:
-    """The evidence in an array on whether it holds labels.
+    """The evidence on whether an array holds labels of objects.
 
     kind    mask: the array has only two values
     values  number of different values, without 0
@@ -45,7 +45,7 @@ class LabelEvidence:
 
 
 def recognise(voxels: NDArray[Any]) -> LabelEvidence:
-    """Return the kind of an array.
+    """Return whether an array is an image, a mask or a label map, and the evidence.
 
     voxels  (z, y, x), any number type; a part of the data is sufficient
 

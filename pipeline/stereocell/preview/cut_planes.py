@@ -29,7 +29,7 @@ _UNSEEN = 0.5  # pixels by which a picture may be too long before it is resample
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """Pictures across one axis.
+    """Pictures of slices across one axis of a volume.
 
     view       direction and orientation of the pictures
     shape      pixels (rows, columns) of a picture

@@ -36,7 +36,7 @@ def fetch_faults(
 
 
 def find_page(address: str, entries: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the address of the page.
+    """Return the address at which a host serves the published page.
 
     This is the folder's address, or its index.html for a host that sends no page for a folder, such
     as S3.

@@ -43,7 +43,7 @@ _SMALL_BYTES = 1000  # bytes; smaller JSON files are not compressed
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """The result of a run.
+    """The result of publishing a bundle once.
 
     address                   the page's address for browsers; None if it is not known
     files, bytes              all files of the bundle, and their size
@@ -140,7 +140,7 @@ def publish(
 
 
 def _compare(target: Target, entries: Entries, specimen: Mapping[str, str]) -> _Work:
-    """Return the changes that are needed at a target.
+    """Compare a target with the bundle, and return the changes that are needed there.
 
     Raises OutputError if the target holds somebody else's files, or files that somebody edited.
     """

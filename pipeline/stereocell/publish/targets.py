@@ -123,7 +123,7 @@ class StoreTarget:
 
     @cached_property
     def _storage(self) -> tuple[Any, str]:
-        """fsspec's file system, and the target's path in it."""
+        """The file system of fsspec that the target is in, and the target's path in it."""
         import fsspec
 
         with self._in_one_line(""):

@@ -43,7 +43,7 @@ class Picture:
 
 
 def draw_scene(scene: Scene) -> Picture:
-    """Return a picture of the scene."""
+    """Draw a scene of meshes and boxes; return the picture."""
     shapes = map(_load, scene.surfaces)
     image = Image.fromarray(draw_pixels(shapes, scene.frame, scene.size, boxes=scene.boxes))
     return Picture(encode(image), *image.size)

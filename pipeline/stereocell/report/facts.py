@@ -53,7 +53,7 @@ class LodFacts:
 
 @dataclass(frozen=True, slots=True)
 class UnitFacts:
-    """One finished (tile, channel).
+    """The numbers of one finished unit, which is a channel in a tile.
 
     directory   folder of the unit's results
     iso_value   voxel value above the background; None: the channel has none
@@ -108,7 +108,7 @@ class StepFacts:
 
 @dataclass(frozen=True, slots=True)
 class FileFacts:
-    """Files of one kind in one part of OUT."""
+    """Number and size of the files with one suffix in units, stage or bundle."""
 
     part: str
     suffix: str
@@ -227,7 +227,7 @@ def _lod(record: dict[str, Any], size: int) -> LodFacts:
 
 
 def sum_up(units: Iterable[UnitFacts]) -> Total:
-    """Return the sums over these units."""
+    """Return the sums over some units, by level of detail."""
     units = list(units)
     levels = max((len(unit.lods) for unit in units), default=0)
     lods = []

@@ -27,7 +27,7 @@ class ObjectLevel:
 
 @dataclass(frozen=True, slots=True)
 class LabelFacts:
-    """One label map.
+    """The numbers of one label map.
 
     color    linear RGB, 0..1
     objects  number of objects

@@ -66,7 +66,7 @@ def write_report(out: Path) -> None:
 
 
 def render(out_folder: OutFolder, facts: Facts) -> str:
-    """Return the page as HTML."""
+    """Return the report as one HTML page."""
     plan = facts.plan
     tissue = find_tissue(out_folder.out, plan)  # read first, since damaged files raise an error
     chosen = choose_units(len(plan.tiles), len(plan.channels), MAX_PICTURED)

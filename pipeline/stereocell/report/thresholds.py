@@ -37,7 +37,7 @@ _LI_VOXELS = 200_000  # approximate number of voxels that represent the counts i
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One threshold.
+    """One threshold in the figure: the adaptive one, or that of another method.
 
     kind   CSS class of the threshold's line in the chart
     value  the threshold as a voxel value

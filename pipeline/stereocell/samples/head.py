@@ -39,7 +39,7 @@ WHITE_LEVEL = 1000.0  # voxel value of white matter, without bias
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """An ellipsoid.
+    """A part of the head phantom, which is an ellipsoid.
 
     label      class of the tissue, BACKGROUND to OTHER
     signal     as a share of white matter's signal

@@ -16,7 +16,7 @@ def find_texels(
     size: tuple[int, int],
     beyond: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the texels in and near triangles.
+    """Return the texels of a map that lie in or near a mesh's triangles.
 
     uvs        float32 (n, 2), origin at the lower left
     triangles  uint32 (m, 3)
@@ -52,7 +52,7 @@ def find_pixels(
     *,
     nearest: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return the visible points of triangles in a view.
+    """Return the triangle that is visible at each pixel of an image, and the point on it.
 
     corners  float64 (m, 3, 2), pixels, x right, y down
     depth    float64 (m, 3), larger is nearer

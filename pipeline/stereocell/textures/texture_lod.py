@@ -25,7 +25,7 @@ class VertexValues:
     paint: NDArray[np.float32] | None = None
 
     def at(self, vertices: NDArray[np.int64]) -> Baked:
-        """Return the values of some of the vertices, in 8 bits."""
+        """Return the values at the vertices with these indices, in 8 bits."""
         openness = np.round(self.openness[vertices] * 255).astype(np.uint8)
         if self.paint is None:
             return Baked(openness)

@@ -37,7 +37,7 @@ MIN_SHARE = 0.01  # least share of the voxels in a class
 
 @dataclass(frozen=True, slots=True)
 class TissueOptions:
-    """How classes are learned."""
+    """How tissue classes are learned."""
 
     classes: int | Literal["auto"] = "auto"
     brain: bool = False  # learn only inside the brain: heads in MR
@@ -55,7 +55,7 @@ class TissueOptions:
 
 @dataclass(frozen=True, slots=True)
 class Tissue:
-    """The learned classes, by rising intensity.
+    """The learned tissue classes, by rising intensity.
 
     probabilities  float32 (k, z, y, x), 0..1; their sum is 1 in the mask and 0 outside
     mask           bool (z, y, x): where classes were learned

@@ -43,7 +43,7 @@ NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class ChannelStatistics:
-    """The statistics of one channel.
+    """The statistics of one channel over the whole dataset.
 
     window      lowest and highest voxel value
     histogram   voxel counts in 256 bins of the window

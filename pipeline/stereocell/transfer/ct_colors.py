@@ -40,7 +40,7 @@ _OPACITY, _SKIN_OPACITY, _BONE_OPACITY = 0.45, 0.95, 0.6
 
 
 def tissue_shapes(level: float, window: tuple[float, float], gradient_max: float) -> Shapes:
-    """Return the bands of tissues that lie in a window.
+    """Return a shape for each tissue's band of values that lies in a window.
 
     level         iso-value of the surface, Hounsfield units
     window        Hounsfield units that become 0 and 1

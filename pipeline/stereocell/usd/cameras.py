@@ -34,7 +34,7 @@ def define_cameras(
     group: Sdf.Path = CAMERAS,
     unit_m: float = METERS_PER_UNIT,
 ) -> None:
-    """Define the cameras, which look along -z.
+    """Define the three cameras of a stage, which look along -z.
 
     box     (2, 3), lower and upper corner (x, y, z) of all content, in the world; the cameras
             stand in front of it

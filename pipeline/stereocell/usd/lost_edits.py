@@ -54,7 +54,7 @@ def _nothing(_place: str, _name: str) -> str:
 
 
 class _Fate(Enum):
-    """The reason why an opinion is not reported."""
+    """The reason why no message reports an opinion, although a layer states it."""
 
     TAKEN = 1  # the bundle takes it over
     COVERED = 2  # another message reports it: on its prim, or on the prims in its group
@@ -62,7 +62,7 @@ class _Fate(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LostEdit:
-    """An edit that no bundle takes over.
+    """An edit of a user's layer that no bundle takes over.
 
     what    the prim with the property or the metadata, in the words of the message
     name    name of the property or the metadata; edits of one name and reason are similar
@@ -154,7 +154,7 @@ def _bound_materials(stage: Usd.Stage, built: BuiltLayers) -> set[Sdf.Path]:
 
 
 class _Finder:
-    """Decides for each opinion whether it is lost.
+    """Decides for each opinion of a user's layer whether a bundle loses it.
 
     An opinion on a class reaches several prims by inheritance. It counts once.
     """
@@ -170,7 +170,7 @@ class _Finder:
         self._covered: set[Sdf.Path] = set()
 
     def add(self, prim: Usd.Prim, opinion: Opinion) -> None:
-        """Judge an opinion at one of the prims that it reaches."""
+        """Decide, and keep, whether an opinion is lost at one of the prims that it reaches."""
         edit = self._judge(prim, opinion)
         self._found.setdefault(opinion.source, []).append(edit)
 

@@ -55,7 +55,7 @@ INPUTS = (
 
 @dataclass(frozen=True, slots=True)
 class StageLamp:
-    """A lamp of the viewer.
+    """A lamp of the viewer, made from a light of the stage.
 
     color     linear RGB; the largest of the three is 1
     strength  radiance of a white surface that the lamp lights, see the module's docstring
@@ -72,7 +72,7 @@ class StageLamp:
 
 @dataclass(frozen=True, slots=True)
 class StageLights:
-    """The light of a stage.
+    """The light of a stage as the viewer shows it: lamps, and the light of the surroundings.
 
     lamps  the strongest lamps, at most MAX_LAMPS, strongest first
     lost   names of the weaker lamps, which are left out

@@ -23,7 +23,7 @@ class ComposedMaps:
 
     @property
     def files(self) -> list[Path]:
-        """The files of the maps that exist."""
+        """The image files of the maps that the surface has."""
         return [file for file in (self.normal, self.occlusion, self.color) if file is not None]
 
     @property

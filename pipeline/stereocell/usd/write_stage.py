@@ -88,7 +88,7 @@ class TileExtent:
 
     @classmethod
     def of(cls, tile: TileContent) -> "TileExtent":
-        """Return the extent of a tile."""
+        """Return the extent of a tile's content, without its voxels and meshes."""
         return cls(tile.id, tile.first_um, tile.last_um, tile.spacing_um)
 
     @property

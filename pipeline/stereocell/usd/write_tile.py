@@ -110,7 +110,7 @@ def _closed_name(channel_id: str) -> str:
 
 
 def _compose(tile: TileContent, has_vdb: bool) -> Sdf.Layer:
-    """Return the layer tile.usdc."""
+    """Return the layer of a tile, tile.usdc, before it is written."""
     stage = new_stage(".usdc", tile.id)
     root = UsdGeom.Xform.Define(stage, Sdf.Path.absoluteRootPath.AppendChild(tile.id)).GetPrim()
     Usd.ModelAPI(root).SetKind(Kinds.Tokens.component)

@@ -197,7 +197,7 @@ def _define_parts(
     foot: NDArray[np.float64],
     scale: float,
 ) -> None:
-    """Define the meshes, tile by tile.
+    """Define the meshes of a usdz, tile by tile.
 
     foot   point (x, y, z) that moves to the origin, world um
     scale  metres in the file per um
@@ -267,7 +267,7 @@ def _define_look(
 
 
 def _define_surface(stage: Usd.Stage, path: Sdf.Path, given: Material) -> UsdShade.Material:
-    """Define a material with plain values only."""
+    """Define a material of a usdz with plain values, without images."""
     material = UsdShade.Material.Define(stage, path)
     surface = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
     surface.CreateIdAttr("UsdPreviewSurface")

@@ -94,7 +94,7 @@ def find_damage(root: Path, listed: FileList, *, since: Path | None = None) -> d
 
 
 def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
-    """Return the fault of a file that differs from the list."""
+    """Return the fault of a file that differs from the list: DAMAGED, CHANGED or DOUBTFUL."""
     if file.suffix not in LAYER_SUFFIXES:
         return DAMAGED
     with cached(file):

@@ -32,7 +32,7 @@ from stereocell.verify.stage_against_source import SourceTask, UnitFinding, comp
 
 
 def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator[CheckLine]:
-    """Yield a line for each comparison.
+    """Yield a line for each comparison of stage with source and of bundle with stage.
 
     stage  the layer that the bundle was exported from; None for OUT's own stage
 

@@ -49,7 +49,7 @@ NO_SURFACES = Surfaces(
 
 
 def find_surfaces(mesh: Mesh, labels: NDArray[np.uint64], beyond: NDArray[np.float32]) -> Surfaces:
-    """Return the surfaces of a tile's objects.
+    """Return areas and shared triangles of the surfaces of a tile's objects.
 
     labels  uint64 (n,), labels in the order of `mesh.objects`
     beyond  float32 (tiles, 6), smallest and largest (x, y, z), um, of other tiles' objects

@@ -46,7 +46,7 @@ _ALONG = 1 - 1e-6  # smallest cosine between equal normals, which is 0.08 degree
 
 @dataclass(frozen=True, slots=True)
 class SourceTask:
-    """One unit, and the tile of the stage that holds it.
+    """One unit (a channel in a tile), and the stage that holds its result.
 
     first_um       (z, y, x), um, centre of the unit's first voxel without the apron
     own_shape      (z, y, x), voxels of the unit without the apron
