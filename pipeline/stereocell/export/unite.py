@@ -1,8 +1,8 @@
 """Make one closed solid of a channel's surfaces, which are open where tiles meet.
 
-Neighbouring tiles have exactly the same vertices where they meet, at each level. Surfaces are
-closed at the faces of the whole block (isosurface/extract.py). So tiles need no boolean operation
-to be united: vertices at equal positions are merged. Tiles and parts that are not exported are cut
+Neighbouring tiles have exactly the same vertices where they meet, at each level of detail. Caps
+close surfaces at the ends of the built region (isosurface/extract.py). So tiles need no boolean
+operation to be united: vertices at equal positions are merged. Tiles that are not exported are cut
 off afterwards by boxes.
 
 If a tile is hidden or was moved, its neighbours are closed at the shared face (cap.py). Tiles that

@@ -6,8 +6,9 @@ little-endian.
 
 Each brick is a separate zstd frame. Its name is the first 128 bits of the SHA-256 of that frame. So
 a cache of bricks is addressed by content, and the client checks a brick before it unpacks it.
-Bricks are stored without differences and at level 3. Differences along x made them 5 % larger (7 T
-head, zstd 1 to 9), and zstd's level 9 saved 1 % of the bytes in six times the time.
+Bricks hold texels, not differences of neighbouring texels, and zstd packs them at its level 3.
+Differences along x made them 5 % larger (7 T head, zstd 1 to 9), and zstd's level 9 saved 1 % of
+the bytes in six times the time.
 """
 
 import hashlib

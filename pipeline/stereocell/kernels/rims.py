@@ -86,8 +86,8 @@ def thin_rim(
     planes     uint8 (n,), a bit for each cut plane that a vertex lies in, including this one
     locked     bool (n,), vertices that stay
     error      largest distance of a vertex from the remaining curve
-    sharpest   cosine of the smallest angle that a triangle may have; if triangles around are
-               sharper already, the bound is lower
+    sharpest   cosine of the smallest angle that a triangle may have; the angle may be smaller where
+               triangles are sharper already
     """
     n = len(at)
     mesh = make_mesh(n, len(triangles), planes=planes)

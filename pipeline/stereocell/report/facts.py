@@ -60,7 +60,7 @@ class UnitFacts:
     background  mean of the subtracted background over the tile, voxel values; 0: none
     confidence  0..1, of the iso-value in this tile alone; None: the tile holds no structure
     reason      why there is no surface; empty: there is one
-    voxels      (x, y, z), size of the stored volume with its apron
+    voxels      size (x, y, z) of the stored volume with its apron, in voxels
     volume_bytes, ktx2_bytes  size of the 8-bit voxels, and of their files in the bundle (0: none)
     cover       how the surface covers the source's voxels; None: the channel has no iso-value
     lifted      number of voxels that only noise lifts above the iso-value; None: unknown

@@ -42,7 +42,7 @@ class Body:
     """A part of the head phantom, which is an ellipsoid.
 
     label      class of the tissue, BACKGROUND to OTHER
-    signal     as a share of white matter's signal
+    signal     signal of the tissue, as a share of white matter's
     center     mm from the middle of the field of view (z, y, x): to the front, down, to the
                patient's left
     semi_axes  mm (z, y, x)

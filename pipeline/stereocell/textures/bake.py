@@ -196,7 +196,7 @@ def _in_frame(
 def fill(
     values: NDArray[np.float64], texel: NDArray[np.int64], size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return an image (h, w, k) of texel values; all other texels repeat the nearest one.
+    """Return an image (h, w, k) with values at some texels; all others repeat the nearest of these.
 
     values  float64 (n, k)
     texel   int64 (n,), row * w + column

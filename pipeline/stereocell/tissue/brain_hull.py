@@ -106,8 +106,8 @@ def fill_hull(
 ) -> NDArray[np.bool_]:
     """Return the voxels that the hull encloses or crosses, bool (z, y, x).
 
-    shape       (z, y, x), voxels
-    spacing_mm  (z, y, x)
+    shape       shape (z, y, x) of the result, voxels
+    spacing_mm  voxel spacing (z, y, x)
     shift_mm    (z, y, x), added to the hull's points
     """
     corners = (hull.points[hull.triangles] + np.asarray(shift_mm)) / np.asarray(spacing_mm)

@@ -45,7 +45,7 @@ NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 class ChannelStatistics:
     """The statistics of one channel over the whole dataset.
 
-    window      lowest and highest voxel value
+    window      voxel values that become 0 and 255
     histogram   voxel counts in 256 bins of the window
     background  values that a build subtracts from the voxels; None: it subtracts none
     suggested   2D function for the channel

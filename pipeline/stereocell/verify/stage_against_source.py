@@ -52,7 +52,7 @@ class SourceTask:
     own_shape      (z, y, x), voxels of the unit without the apron
     placement      rows of a (4, 4) matrix for columns, um, from the voxels' world to the stage's
     samples        number of points that are spread over each surface
-    shares_volume  whether the channel's volume is another channel's
+    shares_volume  whether the channel's volume is that of another channel, so it has none itself
     has_vdb        whether the volumes are also written as .vdb, for other programs
     """
 

@@ -31,7 +31,7 @@ namespace StereoCell.Editor
             return points;
         }
 
-        /// <summary>The points of one row of the table.</summary>
+        /// <summary>The points of the transfer function in one row of the table.</summary>
         /// <param name="rgba">Bytes of the table.</param>
         /// <param name="first">Index of the row's first byte.</param>
         public static List<Vector2> OfRow(byte[] rgba, int first)
