@@ -250,8 +250,8 @@ def _cut(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Return the voxels whose centres are in a region, as first and end (x, y, z) on the lattice.
 
-    Returns None if there are none. If the volumes are rotated in the world, as a scan of a patient
-    may be, this is the smallest box of the lattice around the region.
+    Returns None if no centre is in it. If the volumes are rotated in the world, as a scan of
+    a patient may be, this is the smallest box of the lattice around the region.
 
     start, steps  position of the lattice's (0, 0, 0), and its steps as rows, world um
     first, end    first voxel and end (x, y, z) of all tiles on the lattice

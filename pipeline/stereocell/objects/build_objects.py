@@ -68,7 +68,7 @@ def build_objects(
 
     labels     int32 (z, y, x), 0 outside; objects are closed at the array's ends
     owned      int32 (n,), rising: objects that are built, each completely within the array
-    spacing_um, origin_um  (z, y, x), of the voxels, and of the centre of the first one
+    spacing_um, origin_um  voxel spacing, and centre of the first voxel, (z, y, x)
     step_um    step of the lattice on which vertices lie
     clock      measures the time of each part of the work
 
