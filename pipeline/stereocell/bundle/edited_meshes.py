@@ -109,7 +109,7 @@ def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
 
 
 def _edited_levels(lods: Sequence[ComposedLod]) -> set[int]:
-    """Return the levels of detail whose shape was edited, or that were moved alone."""
+    """Return the levels of detail whose shape was edited, or that were moved without the others."""
     edited = {lod.level for lod in lods if lod.shape != lod.built}
     if len({lod.own for lod in lods}) > 1:
         still = tuple(np.eye(4).ravel().tolist())

@@ -2,7 +2,7 @@
 
 An edited window is applied to the voxels as measured, if the stage has them. The result is exactly
 that of a build with this window. Without the measured voxels, the 8-bit voxels of the build are
-rescaled, so the jumps between neighbouring brightness values may become visible.
+rescaled, so the steps between their 256 brightness values remain visible.
 """
 
 import numpy as np

@@ -123,7 +123,7 @@ class SceneFiles:
         return sum(frames) + sum(meshes) // 4  # gzip leaves more than a quarter of a .glb
 
     def at(self, levels: Levels) -> dict[str, Packed]:
-        """Return all files by path: the bundle without finer levels, the viewer's environments."""
+        """Return all files by path: the bundle's without finer levels, and environment maps."""
         made: dict[str, bytes | None] = {}
         manifest = {**self._manifest, "channels": [], "usdz": None, "usdz_reason": _NO_USDZ}
         for channel in self.channels:

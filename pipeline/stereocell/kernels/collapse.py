@@ -117,7 +117,7 @@ def collapse(
     errors     float64 (n,), largest root of the mean squared distance from the planes; equal for
                all vertices of a connected component
     stray, sharpest  see `Limits`
-    past       int32 (k, 2), collapses of an earlier try with fewer locked vertices; (0, 2): no try
+    past       int32 (k, 2), collapses of an earlier try with fewer locked vertices; (0, 2): none
     caps       uint8 (n,), a bit for each cap that a vertex lies in; None: there are no caps
     result     triangles int32 (m, 3) by the vertices that are left; bool (m,), triangles that are
                left; int32 (k, 2), collapses: a vertex, and the one onto which it has moved

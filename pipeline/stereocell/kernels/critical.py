@@ -51,7 +51,7 @@ def find_critical(labels: Ints, most: int) -> tuple[NDArray[np.int64], int]:
                     continue
                 for corner in range(4):
                     p = i + (corner // 2) * steps[1] + (corner % 2) * steps[2]
-                    # P is a corner of the cube of 2 x 2 x 2 voxels, and o the opposite corner.
+                    # In the cube of 2 x 2 x 2 voxels, corner o is opposite to corner p.
                     o = i + steps[0] + (1 - corner // 2) * steps[1] + (1 - corner % 2) * steps[2]
                     a, b, rest = flat[p], flat[o], -1
                     is_lone, is_hole = a == b and a > 0, True

@@ -142,7 +142,7 @@ def check_sheets_link(mesh: Mesh, ring: Ring, chosen: int, other: Ring) -> bool:
 
 @step
 def find_beyond(v: int, ring: Ring) -> int:
-    """Return the ring's vertex's neighbour on its line that is not v, or -1 if there is none."""
+    """Return the neighbour on the line of the ring's vertex that is not v; -1: there is none."""
     beyond = -1
     for j in range(ring.sizes[NEIGHBOURS]):
         if ring.shared[j] != 2 and ring.near[j] != v:

@@ -26,7 +26,7 @@ def sum_by_value(
 
     field, padding  (z, y, x), a window around the voxels that are counted
     steps           spacing (z, y, x)
-    table           bin of the values from low + k * step on; its ends count for values beyond it
+    table           bin of values from low + k * step on; a value beyond an end counts as that end
     low, step       least value of the table, and the difference between its values
     span            unit of the slopes in the third sum
 

@@ -30,7 +30,7 @@ def alpha_wrap(mesh: Mesh, alpha_um: float, offset_um: float) -> Mesh:
     """Return a closed mesh `offset_um` outside the triangles.
 
     mesh       positions float32 (n, 3) in um, triangles uint32 (m, 3)
-    alpha_um   largest width of the gaps that are closed
+    alpha_um   size of the gaps that are closed
     offset_um  distance of the result from the triangles
     """
     pymeshlab = _import_wrapper()

@@ -32,7 +32,7 @@ class Target(Protocol):
         """The address at which browsers find the files, ending in a slash; None if unknown."""
 
     def sizes(self) -> dict[str, int]:
-        """Return the bytes that each file at the target has, by path, including files of others."""
+        """Return the size in bytes of each file at the target, by path, also of files of others."""
 
     def read(self, path: str) -> bytes:
         """Return a file's content."""
