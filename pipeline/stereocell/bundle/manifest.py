@@ -47,7 +47,7 @@ def find_others(bundle: Path) -> list[str]:
 
 
 def require_bundle(place: Path) -> None:
-    """Raise OutputError if a path holds neither a bundle nor nothing.
+    """Raise OutputError unless a path holds a bundle or nothing.
 
     A folder with a manifest is a bundle. Without a manifest, it may hold only a bundle's files.
     """

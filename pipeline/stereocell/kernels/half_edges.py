@@ -40,7 +40,7 @@ def match_twins(triangles: Ints, count: int) -> Ints:
     for v in range(count):
         first[v + 1] += first[v]
     place, listed = first[:-1].copy(), np.empty(edges, np.int32)
-    # Of each listed half-edge: its higher vertex, and whether it ends there
+    # For each listed half-edge, its higher vertex, and whether it ends there
     far, upward = np.empty(edges, np.int32), np.empty(edges, np.bool_)
     for h in range(edges):
         start, end = corner[h], corner[following(h)]
