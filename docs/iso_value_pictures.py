@@ -23,7 +23,7 @@ BUILDS: Mapping[str, Sequence[str]] = {
     "iso-value-right": (),
     "iso-value-low": ("--iso-value", "Hoechst=230"),
     "iso-value-high": ("--iso-value", "Hoechst=1900"),
-    "spacing-wrong": ("--spacing-um", "0.07,0.14,0.14"),  # z is 0.28 um
+    "spacing-wrong": ("--spacing-um", "0.07,0.14,0.14"),  # the true spacing along z is 0.28 um
 }
 CONTOURS = ("--channel", "CD31", "--tile", "r1_c2", "--preset", "cycif", "--grid", "5x2")
 

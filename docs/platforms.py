@@ -33,7 +33,7 @@ _JOBS = 4  # parallel resolutions, which mostly wait for the registry
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The result for one row on one system with one Python.
+    """The result for one row of the table (the core, or an extra) on one system with one Python.
 
     lacking  the package that has no wheel; empty if all packages have one
     newer    whether the packages need glibc 2.35

@@ -26,7 +26,7 @@ def run(path: Path) -> Any:
     client.extra_arguments = ["--IPKernelApp.log_level=ERROR"]
     client.execute(cwd=str(path.parent))
     for cell in notebook.cells:
-        cell.metadata.pop("execution", None)  # times of the run
+        cell.metadata.pop("execution", None)  # removes the times at which the cell ran
         for output in cell.get("outputs", ()):
             widget = output.get("data", {}).get("application/vnd.jupyter.widget-view+json")
             if widget:

@@ -1,4 +1,4 @@
-"""Write the files that a channel has once in a bundle, and the manifest's entries."""
+"""Write the files that a channel has once for all tiles of a bundle, and the manifest's entries."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -74,7 +74,7 @@ def _describe_view(view: StageView) -> dict[str, Any]:
 def write_channel(
     root: Path, appearance: ComposedAppearance, tiles: Sequence[tuple[str, TileChannel]]
 ) -> tuple[dict[str, Any], list[FileRef]]:
-    """Write the files that a channel has once; return its entry in the manifest, and the files."""
+    """Write a channel's files that cover all tiles; return its manifest entry, and the files."""
     folder = f"channels/{appearance.id}"
     drawn = [channel.lods for _, channel in tiles if channel.lods]
     tilesets = [
@@ -112,7 +112,7 @@ def describe_channel(
 ) -> dict[str, Any]:
     """Return a channel's entry in the manifest.
 
-    triangles  for each tile, the number of triangles of each level
+    triangles  for each tile, the number of triangles at each level of detail
     distances  for each tile, the 99th percentile and the largest distance of each level, um
     """
     return {
@@ -150,7 +150,7 @@ def _bake(appearance: ComposedAppearance) -> np.ndarray[Any, np.dtype[np.uint8]]
 
 
 def _totals(tiles: Iterable[Sequence[int]]) -> list[int]:
-    """Return the number of triangles of all tiles by level.
+    """Return the number of triangles of all tiles at each level of detail.
 
     A tile with fewer levels counts with its coarsest level.
     """
@@ -160,7 +160,7 @@ def _totals(tiles: Iterable[Sequence[int]]) -> list[int]:
 
 
 def _farthest(tiles: Iterable[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
-    """Return the largest distances of all tiles by level.
+    """Return the largest distances, over all tiles, at each level of detail.
 
     A tile with fewer levels counts with its coarsest level.
     """

@@ -58,7 +58,7 @@ _Types = Sdf.ValueTypeNames
 
 
 class _Options(NamedTuple):
-    """The options with which levels are computed."""
+    """The options with which levels of detail are computed."""
 
     lod: LodOptions
     unwrap: UnwrapOptions
@@ -77,7 +77,7 @@ _DEFECTS = {
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """The levels that a bundle shows, finest first, and a message about edits, or empty."""
+    """The levels of detail that a bundle shows, finest first, and a message on edits, or empty."""
 
     lods: tuple[ComposedLod, ...]
     edit: str = ""
@@ -86,7 +86,7 @@ class Shown:
 def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
     """Return a channel's levels in a loaded tile, without those finer than `finest`.
 
-    finest  finest level to return; 0: all levels
+    finest  finest level of detail to return; 0: all levels
 
     Raises StageError if a mesh can't be drawn, or has a point that is not finite.
     """
@@ -109,7 +109,7 @@ def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
 
 
 def _edited_levels(lods: Sequence[ComposedLod]) -> set[int]:
-    """Return the levels whose shape differs from the build, or that were moved separately."""
+    """Return the levels of detail whose shape was edited, or that were moved without the others."""
     edited = {lod.level for lod in lods if lod.shape != lod.built}
     if len({lod.own for lod in lods}) > 1:
         still = tuple(np.eye(4).ravel().tolist())
@@ -122,8 +122,8 @@ def _follow(
 ) -> tuple[list[ComposedLod], list[str]]:
     """Return all levels, with new coarser ones if needed, and remarks about the edits.
 
-    lods    levels as they are composed, finest first
-    edited  levels that were edited
+    lods    levels of detail as they are composed, finest first
+    edited  numbers of the levels that were edited
     """
     fine, options = lods[0], _options(tile.GetStage())
     planes = _cut_planes(tile, channel_id, fine)
@@ -241,7 +241,7 @@ def _compose(
     lod     the level before the edit
     fine    the edited finest level
     source  mesh of `fine` with values at vertices
-    others  sample the green and the blue component of the colours
+    others  look up the green and the blue component of the colours of `fine`
     """
     mesh, baked = made.mesh, made.baked
     assert baked is not None
@@ -324,7 +324,7 @@ def with_vertex_occlusion(lod: ComposedLod) -> Mesh:
 
 
 def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
-    """Return the mesh and its defects.
+    """Return a mesh, with vertices joined if that removes defects, and its defects.
 
     Seams of UVs or normals count as open edges. So vertices at the same position are joined if the
     mesh then has fewer defects.
@@ -334,7 +334,7 @@ def _certified(mesh: Mesh, planes: tuple[Plane, ...]) -> tuple[Mesh, Defects]:
         return mesh, defects
     _, first, twin = np.unique(mesh.positions, axis=0, return_index=True, return_inverse=True)
     triangles = first[twin.ravel()][mesh.triangles].astype(np.uint32)
-    # Triangles at the pole of a UV sphere collapse.
+    # Joining vertices makes some triangles collapse, for example at the pole of a UV sphere.
     has_area = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     triangles = triangles[has_area]
     welded = compact(mesh, triangles)
@@ -355,7 +355,7 @@ def _describe(defects: Defects) -> str:
 
 
 def _cut_planes(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> tuple[Plane, ...]:
-    """Return the faces of the tile's box at which the mesh is open.
+    """Return the planes of the faces of the tile's box at which the mesh is open.
 
     The stage does not state these planes. They are found by open edges near the box's faces whose
     two ends have exactly the same coordinate. Vertices that an artist moved do not have that.
@@ -411,7 +411,7 @@ def _spacing(tile: Usd.Prim, channel_id: str, fine: ComposedLod) -> Spacing:
 
 
 def _options(stage: Usd.Stage) -> _Options:
-    """Return the options with which the stage's levels were made, or the defaults.
+    """Return the options with which the stage's levels of detail were made, or the defaults.
 
     Raises StageError for invalid values.
     """
@@ -427,7 +427,10 @@ def _options(stage: Usd.Stage) -> _Options:
 
 
 def _read_options(kind: type[T], content: Mapping[str, Any], where: str) -> T:
-    """Return options from a section of settings. Ignores unknown keys. Raises StageError."""
+    """Return options from a section of settings, without unknown keys.
+
+    Raises StageError for an invalid value, with `where` and the value's name.
+    """
     known = {field.name for field in fields(kind)}  # type: ignore[arg-type]
     values = {
         key: json.loads(value) if isinstance(value, str) and value.startswith("[") else value

@@ -47,7 +47,7 @@ def gather_table(
 def _joined_boxes(
     boxes: NDArray[np.float32], rows: NDArray[np.int32], count: int
 ) -> NDArray[np.float32]:
-    """Return the box (n, 6) around all pieces of each object: least and largest (x, y, z)."""
+    """Return the bounding box (n, 6) of all pieces of each object: least and largest (x, y, z)."""
     joined = np.empty((count, 6), np.float32)
     joined[:, :3], joined[:, 3:] = np.inf, -np.inf
     np.fmin.at(joined[:, :3], rows, boxes[:, :3])

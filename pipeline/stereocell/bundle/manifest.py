@@ -47,7 +47,10 @@ def find_others(bundle: Path) -> list[str]:
 
 
 def require_bundle(place: Path) -> None:
-    """Raise OutputError if a place holds other files than a bundle. The manifest may be missing."""
+    """Raise OutputError unless a path holds a bundle or nothing.
+
+    A folder with a manifest is a bundle. Without a manifest, it may hold only a bundle's files.
+    """
     is_other = place.exists() and not place.is_dir()
     if MANIFEST in sizes_of(place) or not (is_other or (others := find_others(place))):
         return

@@ -46,7 +46,7 @@ class SceneBlocks:
 
 
 def block(kind: str, name: str, data: bytes, is_packed: bool) -> str:
-    """Return the block of a file.
+    """Return the script element that holds a file in the document.
 
     is_packed  whether `data` is gzip and the reader shall unpack it
     """
@@ -58,12 +58,12 @@ def block(kind: str, name: str, data: bytes, is_packed: bool) -> str:
 
 
 def view_block(view: str) -> str:
-    """Return the block with the view at opening; an empty text for an empty view."""
+    """Return the element with the camera view at opening; an empty text for an empty view."""
     return f'    <script type="text/plain" data-view>{view}</script>\n' if view else ""
 
 
 def read_blocks(document: str) -> SceneBlocks:
-    """Return the content of a document. Raises OutputError for a damaged or repeated block."""
+    """Return the files in a document. Raises OutputError for a damaged or repeated block."""
     found = SceneBlocks(view="".join(_VIEW_BLOCK.findall(document)))
     room = _MAX_GROWTH * len(document)
     for kind, escaped, size, digest, packed, text in _BLOCK.findall(document):

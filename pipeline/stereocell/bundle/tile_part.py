@@ -21,7 +21,7 @@ from stereocell.storage.file_list import sizes_of
 from stereocell.storage.json_files import read_json, write_json
 
 _RECORD = "tile.json"
-# Parts of earlier versions have another name for the areas.
+# The records of earlier versions call the areas of interfaces `wall_um2`.
 _INTERFACE_UM2 = Field(validation_alias=AliasChoices("interface_um2", "wall_um2"))
 
 
@@ -68,7 +68,7 @@ class TileChannel:
     joint      joint histogram of the volume, packed, see bundle/write_transfer2d.py; None: no
                volume
     edit       message about edits of the surface by hand; empty: none
-    objects    objects of a label map; None: none
+    objects    objects of a label map; None: the channel is no label map, or has no surface here
     """
 
     __pydantic_config__ = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
@@ -89,7 +89,7 @@ class BundleTile:
     """One tile in the bundle.
 
     low      lower corner (x, y, z) of the tile's box, world um
-    high     upper corner
+    high     upper corner of the box, like `low`
     changed  paths of the tile's layers that differ from the stage's list, relative to the stage
     name     display name; empty: none
     """
@@ -123,7 +123,7 @@ def read_part(part: Path) -> BundleTile:
         raise OutputError(f"{part / _RECORD}: damaged: {remedy}") from None
     sizes = sizes_of(part)
     refs = [ref for channel in tile.channels for ref in channel.files]
-    # Files are moved by these paths, so each must be a file of this folder.
+    # Files are moved by the paths in the record, so each path must be one of a file in this folder.
     if tile.id != part.name or any(sizes.get(ref.path) != ref.bytes for ref in refs):
         raise OutputError(f"{part}: damaged: {remedy}")
     return tile

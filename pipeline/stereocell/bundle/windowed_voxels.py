@@ -1,8 +1,8 @@
 """Read the voxels of a composed volume as 8 bits, with the window of the composed stage applied.
 
 An edited window is applied to the voxels as measured, if the stage has them. The result is exactly
-that of a build with this window. Without them, the 8-bit voxels of the build are rescaled, so their
-steps remain visible.
+that of a build with this window. Without the measured voxels, the 8-bit voxels of the build are
+rescaled, so the steps between their 256 brightness values remain visible.
 """
 
 import numpy as np
@@ -21,9 +21,11 @@ from stereocell.usd.written_files import AsWritten
 def read_windowed(
     volume: ComposedVolume, appearance: ComposedAppearance, *, as_written: AsWritten | None = None
 ) -> NDArray[np.uint8]:
-    """Return a volume with its apron, uint8 (z, y, x). Raises StageError.
+    """Return a volume with its apron, uint8 (z, y, x).
 
     as_written  the lists to compare the file with; None: no comparison
+
+    Raises StageError if the volume's file is damaged, or has another size than the stage states.
     """
     is_edited = appearance.window != appearance.volume_window
     measured = volume.measured if is_edited else None
@@ -45,7 +47,10 @@ def read_windowed(
 
 
 def read_measured(volume: ComposedVolume) -> NDArray[np.float32]:
-    """Return the voxels as measured, float32 (z, y, x), with the apron. Raises StageError."""
+    """Return the voxels as measured, float32 (z, y, x), with the apron.
+
+    Raises StageError if their .vdb is missing or damaged.
+    """
     assert volume.measured is not None
     values = VdbValues(volume.measured, MEASURED_NAME)
     low, high, size = (np.array(corner) for corner in (volume.low, volume.high, volume.size))

@@ -211,14 +211,14 @@ def _write_added(composed: Composed, root: Path) -> tuple[dict[str, Any], list[F
 
 
 def views_of(stage: Usd.Stage) -> list[StageView]:
-    """Return the named views of a stage. Raises StageError."""
+    """Return the named camera views of a stage. Raises StageError for a wrong camera."""
     return list(read_views(stage, *_box_of(stage)))
 
 
 def lights_of(composed: Composed) -> StageLights | None:
     """Return the lights that a user's layers edit or add; None: the viewer uses its own lamps.
 
-    Raises StageError.
+    Raises StageError for values over time, and for an image that can't be read.
     """
     require = composed.as_written.require
     return read_lights(composed.stage, *_box_of(composed.stage), require)

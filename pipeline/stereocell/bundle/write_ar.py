@@ -31,7 +31,7 @@ def write_ar(
     entry = {"path": USDZ_NAME, **measure(path)}
     if entry["bytes"] <= MAX_USDZ_BYTES:
         return entry, ""
-    path.unlink()  # the folder is not stored yet, so deleting the local file is enough
+    path.unlink()  # the bundle is not on object storage yet, so deleting the local file is enough
     return None, (
         f"it would have {entry['bytes'] / 2**20:.0f} MiB, above the limit of "
         f"{MAX_USDZ_BYTES / 2**20:.0f} MiB for phones"

@@ -66,7 +66,8 @@ def write_objects(
         content["paint"] = paint
     for i, column in enumerate(table.columns):
         data, entry = _describe(column)
-        # The number keeps names apart on disks that ignore case: IDs may differ only by case.
+        # The column's number keeps file names apart on disks that ignore case, since the IDs of
+        # columns may differ only by case.
         entry["bytes"] = write(f"{i}_{column.id}.u8", data)
         values = column.values.astype("<f4")
         entry["exact"] = write(f"{i}_{column.id}.f32", values)
@@ -93,7 +94,7 @@ def hash_parts(data: bytes) -> list[str]:
 
 
 def _compact(rows: NDArray[np.int32]) -> dict[str, Any]:
-    """Describe rows as a run of consecutive rows from the first on, and a list of the others."""
+    """Describe row numbers: a run of consecutive ones from the first on, and a list of the rest."""
     if len(rows) == 0:
         return {"first": 0, "count": 0}
     is_next = rows == rows[0] + np.arange(len(rows))
@@ -148,7 +149,7 @@ def _quantize(values: NDArray[np.float32]) -> tuple[NDArray[np.uint8], dict[str,
 def _neighbours(
     interfaces: NDArray[np.int32], count: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.int64]]:
-    """Return the neighbours of each row as a flat list.
+    """Return, as a flat list, the rows of the objects that touch each row's object.
 
     Returns the index of each row's first neighbour (count + 1,), all neighbours (2 m,), ascending
     within a row, and an order (2 m,). The order sorts two copies of the interfaces, one after the

@@ -54,7 +54,7 @@ def write_tile(
     appearances: tuple[ComposedAppearance, ...],
     step_m: float,
 ) -> None:
-    """Write the part of one tile.
+    """Write the part of a bundle for one tile.
 
     part    folder of the part, whose name is the tile's ID
     step_m  step of the lattice for vertices, metres, see formats/gltf.py
@@ -107,7 +107,7 @@ def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tup
 
     Without volumes, these are the corners of the tile's extentsHint.
 
-    Raises StageError.
+    Raises StageError if the hint is missing or invalid.
     """
     boxes = [
         move_box(np.array(volume.low), np.array(volume.high), volume.matrix)
@@ -172,7 +172,7 @@ def _export_channel(
 
 
 def _bare(lod: ComposedLod) -> ComposedLod:
-    """Return the coarsest level without details that show only at close range.
+    """Return the coarsest level of detail without values that show only at close range.
 
     Users wait for this level first. In the sample, maps, UVs and vertices that charts had split
     were five sixths of the coarsest level's bytes. The occlusion moves from the map to the

@@ -22,7 +22,7 @@ from stereocell.model.world_box import WorldPoint
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
 from stereocell.usd.composed_appearance import ComposedAppearance
 
-COUNTED_VOXELS = 4_000_000  # voxels of a tile; in a larger tile, planes are skipped
+COUNTED_VOXELS = 4_000_000  # voxels of a tile that are counted; slices of a larger one are skipped
 _STORED = np.dtype("<u4")
 
 
@@ -57,7 +57,7 @@ def count_tile(voxels: NDArray[np.uint8], volume: PlacedVolume, gradient_max: fl
     cut = volume.apron - 1  # leaves a border of one voxel around the counted voxels
     own = voxels[(slice(cut, -cut or None),) * 3] if cut >= 0 else np.pad(voxels, 1, mode="edge")
     every = -(-own.size // COUNTED_VOXELS)
-    # A volume of a single plane has spacing 0 across it. It gets the finest other spacing.
+    # Across a single slice, the spacing of a volume is 0. The finest other spacing replaces it.
     finest = min(step for step in (x, y, z, 1.0) if step > 0)
     spacing = (z or finest, y or finest, x or finest)
     counts = count_joint(own, spacing, gradient_max=gradient_max, every=every)

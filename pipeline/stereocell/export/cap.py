@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from stereocell.meshes.validity import border
 
 Plane = tuple[int, float]  # axis of the plane's normal (0: x), and the plane's coordinate
-_NEAR = 1e-4  # largest distance of a vertex from its plane, as a share of the surface's size
+_NEAR = 1e-4  # largest distance of a vertex from its plane, as a share of the box's longest edge
 
 
 def close_cuts(
@@ -47,7 +47,7 @@ def close_cuts(
 
 
 def _third_corners(triangles: NDArray[np.uint32], edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return, for each directed edge, the corner of its triangle that is opposite to the edge."""
+    """Return, for each directed edge, the corner opposite to it in its triangle."""
     wide = triangles.astype(np.int64)
     all_edges = np.concatenate([wide[:, [0, 1]], wide[:, [1, 2]], wide[:, [2, 0]]])
     third = np.concatenate([wide[:, 2], wide[:, 0], wide[:, 1]])

@@ -37,7 +37,7 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """The surface of a channel in a tile.
+    """The surface of a channel in a tile, as read for an export.
 
     mesh     in world um; values of maps are stored at its vertices
     objects  objects of a label map's tile, which `mesh.objects` refers to
@@ -171,7 +171,7 @@ class Chosen:
         return float((high - low).max())
 
     def describe_scale(self, scale: float) -> str:
-        """Return words for the physical size of the exported part and its size in the file."""
+        """Return text on the physical size of the exported part, and on its size in the file."""
         low, high = self.box
         size, shown = (describe_size((high - low) * one) for one in (1.0, scale))
         if scale != 1:
@@ -180,7 +180,7 @@ class Chosen:
         return f"life-size, {size}" + (f"; --scale {larger:.0f} enlarges it" if larger > 1 else "")
 
     def nothing(self, kind: str) -> UsageError | StageError:
-        """Return the error that nothing of a kind, such as a surface, is left to export.
+        """Return the error to raise if nothing of a kind, such as a surface, is left to export.
 
         If there is a region, the message states the box that a region may overlap.
         """
@@ -247,7 +247,7 @@ class Chosen:
     def pieces(
         self, level: int, *, whole: bool = False, channel: str | None = None
     ) -> Iterator[Piece]:
-        """Yield the surfaces at a level, one tile after the other.
+        """Yield the surfaces at a level of detail, one tile after the other.
 
         whole    read all tiles and do not clip to the region, for solids that are cut later
         channel  ID of the channel to read; None: all selected channels
@@ -313,7 +313,7 @@ class Chosen:
             self.report(f"{number}/{len(self.tiles)} {name}")
 
     def tile_boxes(self) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Return the corners (x, y, z) of each visible tile, world um: neighbours meet there."""
+        """Return the corners (x, y, z) of each visible tile, world um, where neighbours meet."""
         boxes = {}
         for name in self.all_tiles:
             with self._loaded(name) as (tile, _):

@@ -17,7 +17,7 @@ from stereocell.usd.lost_edits import WHOLE
 from stereocell.usd.numbers2d import ATTRIBUTES
 from stereocell.usd.specimen import specimen_of
 
-Names = dict[str, tuple[str, ...]]  # place -> patterns of names
+Names = dict[str, tuple[str, ...]]  # patterns of property names, by place of `edit_table`
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,8 @@ def notes_on_functions(stage: Usd.Stage, lacks: tuple[Lack, ...]) -> Iterator[st
     Yields nothing if the format holds transfer functions.
     """
     reason, built = left_out(lacks, "channel", "transferFunction"), BuiltLayers(stage)
-    session = stage.GetSessionLayer()  # has the selections of readers, not of users
+    # In the session layer this program selects variants to read them, so these are not edits.
+    session = stage.GetSessionLayer()
     for prim in stage.GetPrimAtPath(specimen_of(stage).channels).GetChildren() if reason else ():
         choosing = [
             spec.layer

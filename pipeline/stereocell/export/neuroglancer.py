@@ -40,7 +40,7 @@ from stereocell.model.extra_packages import import_extra
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
 
-_NM = 1e-9  # m
+_NM = 1e-9  # metres
 Surface = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
 
@@ -83,7 +83,7 @@ def write_precomputed(chosen: Chosen, path: Path, _: int) -> str:
 
 @dataclass(slots=True)
 class _Found:
-    """The surfaces of a channel.
+    """The surfaces of a channel in all tiles and at all levels of detail.
 
     surfaces  by segment ID, for each level the surfaces of all tiles; the ID is 0 if the channel is
               not a label map
@@ -123,7 +123,7 @@ def _level(parts: list[Surface], to_nm: NDArray[np.float64]) -> Level:
 
 
 def _different(levels: list[Level]) -> list[Level]:
-    """Return the levels, finest first, without those that repeat the triangles of a finer one."""
+    """Return levels of detail, finest first, without those that repeat a finer one's triangles."""
     kept = levels[:1]
     for level in levels[1:]:
         if len(level.triangles) < len(kept[-1].triangles):
@@ -145,7 +145,7 @@ def _places(chosen: Chosen, layout: Layout | None) -> NDArray[np.float64]:
     grid = layout.grid
     to_source[:3] *= METERS_PER_UNIT / UNITS_M[grid.unit]
     to_index = np.linalg.inv(grid.affine) @ to_source
-    to_index[:3, 3] += 0.5  # a voxel's centre
+    to_index[:3, 3] += 0.5  # voxel k spans k to k + 1, so its centre is at k + 0.5
     return np.diag([*_resolution(layout), 1.0]) @ to_index
 
 
@@ -156,7 +156,7 @@ def _resolution(layout: Layout) -> tuple[float, float, float]:
 
 
 def _write_image(folder: Path, chosen: Chosen, layout: Layout) -> int:
-    """Write the image; return the number of its scales.
+    """Write the image of all channels; return the number of its scales (resolution levels).
 
     Each scale is computed from the one before. They are stored in temporary files.
     """

@@ -24,17 +24,17 @@ class ExportOptions:
     channels       names or IDs of the channels; empty: all that the format can hold
     tiles          names of the tiles; empty: all
     lod            level of detail, 0: the finest; a tile with fewer levels uses its coarsest
-    max_triangles  largest number of triangles, which decides the level
-    max_bytes      largest size of the file in bytes, which decides the level
+    max_triangles  largest number of triangles, which decides the level of detail
+    max_bytes      largest size of the file in bytes, which decides the level of detail
     region         box that the content is clipped to
     units          unit of the numbers in formats that do not state one
     scale          length in the file / length of the specimen
-    compress       `meshopt` or `draco`
-    components     whether a .3mf has one object per body, joined by components
+    compress       compression of a glTF file, `meshopt` or `draco`
+    components     whether a .3mf has one mesh per body, joined by 3MF components
     occlusion      whether vertices are darkened by ambient occlusion
-    bits           bits per voxel
+    bits           bits per voxel, 8 or 16
     unity          whether to write one channel for UnityVolumeRendering's importers
-    wall_mm        mm in print; thinner parts are reported
+    wall_mm        thickness in print, mm; thinner bodies are reported
     width          width of an image or a video, in pixels
     max_mb         largest size of a page in one file, in millions of bytes
     strict         whether an edit that the file can't hold is an error
@@ -76,7 +76,7 @@ class ExportOptions:
 def parse_region(text: str) -> Region:
     """Return the box of a text `x0:x1,y0:y1,z0:z1` in um; an empty end is infinite.
 
-    Raises UsageError.
+    Raises UsageError for other text, or a first end that is not less than the second.
     """
     ends = [pair.partition(":") for pair in text.split(",")]
     try:

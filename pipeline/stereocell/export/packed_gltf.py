@@ -28,9 +28,9 @@ _DRACO_TYPES = {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2}  # GeometryAttribute::
 
 
 def packed_buffers(name: str, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> Buffers:
-    """Return buffers for a compression.
+    """Return the buffers that compress meshes by one of the two extensions.
 
-    name           `meshopt` or `draco`
+    name           name of the compression, `meshopt` or `draco`
     low_m, high_m  corners (x, y, z) of the specimen's box, metres
 
     Raises UsageError if the library is not installed.
@@ -46,7 +46,8 @@ class MeshoptBuffers:
     extensions: tuple[str, ...] = ("EXT_meshopt_compression", "KHR_mesh_quantization")
 
     def __init__(self, low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> None:
-        edge = float((high_m - low_m).max()) * 1.05  # caps lie one voxel outside the tiles
+        # Larger than the tiles, since caps lie one voxel outside of them
+        edge = float((high_m - low_m).max()) * 1.05
         self._step = 2.0 ** math.ceil(math.log2(edge / (_STEPS - 1)))
         self._buffers = CompressedBuffers()
 
@@ -90,7 +91,8 @@ class DracoBuffers:
         draco = import_extra("DracoPy", extra="draco", wanted_by="--compress draco")
         self._encode, self._decode = draco.encode, draco.decode
         edge = float((high_m - low_m).max())
-        self._origin = low_m - 0.05 * edge  # caps lie one voxel outside the tiles
+        # Outside of the tiles, since caps lie one voxel outside of them
+        self._origin = low_m - 0.05 * edge
         self._range = 1.1 * edge
         self._data = bytearray()
         self._views: list[dict[str, Any]] = []

@@ -29,7 +29,7 @@ _SAME_BYTES = ["-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]
 
 
 def write_picture(chosen: Chosen, path: Path, level: int) -> str:
-    """Write .png; return a sentence about it."""
+    """Write an image of the surfaces as .png; return a sentence about it."""
     width = chosen.options.width or _PICTURE_WIDTH
     shapes = list(_shapes(chosen, level))
     # Frame the surfaces and not the tiles: a patient's box is often twice as large.

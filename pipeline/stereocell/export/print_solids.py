@@ -36,7 +36,9 @@ from stereocell.usd.read_stage import specimen_name
 HAND_M = 0.1  # m, size of a hand: limit for the specimen's longest edge without --scale
 UNIT = "mm"  # unit that slicers assume for numbers without a unit
 WALL_MM = 0.8  # mm, two lines of the usual nozzle of 0.4 mm
-_MAX_REPORTED = 8  # parts with thin bodies that are reported; a label map may have thousands
+# Largest number of parts (channels or objects) whose thin bodies are reported; a label map may have
+# thousands
+_MAX_REPORTED = 8
 Color = tuple[float, float, float]
 
 
@@ -54,7 +56,7 @@ class _Surface:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """The content of one body of the file.
+    """A channel, or an object of a label map, which becomes one body of the file.
 
     channel   ID of the channel
     color     linear RGB
@@ -136,7 +138,7 @@ def _handy(chosen: Chosen) -> float:
 def _solids(
     chosen: Chosen, level: int, *, is_one: bool
 ) -> Iterator[tuple[_Part, manifold3d.Manifold]]:
-    """Yield each part with its solid.
+    """Yield each channel, or object of a label map, with its solid.
 
     is_one  whether all channels become one solid
     """

@@ -101,7 +101,7 @@ def _about(files: SceneFiles, levels: Levels, size: int) -> str:
 
 
 def _finer(count: int, kind: str, of: str) -> list[str]:
-    """Return a list with words for left-out levels; empty if there are none."""
+    """Return a list with a text on the finer levels that were left out; empty if there are none."""
     return [f"{count} finer {kind}{'s' if count > 1 else ''} {of}"] if count else []
 
 

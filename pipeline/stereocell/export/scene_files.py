@@ -27,7 +27,7 @@ _NO_USDZ = "a scene in one file has none"
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """The bytes of a file, as gzip or unchanged."""
+    """The bytes of a file for a scene in one file, as gzip or unchanged."""
 
     data: bytes
     is_packed: bool
@@ -44,7 +44,11 @@ def pack(path: str, data: bytes) -> Packed:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """The finest levels that are kept, 0: all levels. A tile always keeps its coarsest level."""
+    """The finest levels that are kept, 0: all levels. A tile always keeps its coarsest level.
+
+    surfaces  level of detail
+    volumes   mip level
+    """
 
     surfaces: int
     volumes: int
@@ -89,13 +93,13 @@ class SceneFiles:
 
     @property
     def surface_levels(self) -> int:
-        """The number of levels of the surfaces; 0: there are no surfaces."""
+        """The largest number of levels of detail of a surface; 0: there are no surfaces."""
         roots = (tileset["root"] for tileset in self._tilesets.values())
         return max((lod + 1 for root in roots for _, lod in surfaces(root)), default=0)
 
     @property
     def volume_levels(self) -> int:
-        """The number of mip levels of the volumes; 0: there are no volumes."""
+        """The largest number of mip levels of a volume; 0: there are no volumes."""
         return max((len(one["levels"]) for one in self._volume_entries()), default=0)
 
     def largest_volume(self, levels: Levels) -> tuple[int, int, int]:
@@ -116,10 +120,10 @@ class SceneFiles:
             for id_, tileset in self._tilesets.items()
             for uri, _ in surfaces(without_finer(tileset["root"], levels.surfaces))
         )
-        return sum(frames) + sum(meshes) // 4  # gzip shrinks a .glb to more than a quarter
+        return sum(frames) + sum(meshes) // 4  # gzip leaves more than a quarter of a .glb
 
     def at(self, levels: Levels) -> dict[str, Packed]:
-        """Return all files by path: the bundle at some levels, and the viewer's environments."""
+        """Return all files by path: the bundle's without finer levels, and environment maps."""
         made: dict[str, bytes | None] = {}
         manifest = {**self._manifest, "channels": [], "usdz": None, "usdz_reason": _NO_USDZ}
         for channel in self.channels:

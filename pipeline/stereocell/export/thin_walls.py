@@ -12,8 +12,9 @@ import numpy as np
 from stereocell.meshes.validity import label_components
 
 _RAYS = 33  # rays per body; an odd number, so that the median is the length of one ray
-_NAMED = 3  # bodies whose places are reported
-_MAX_BODIES = 500  # bodies that are measured, smallest first; large ones are rarely thin
+_NAMED = 3  # largest number of thin bodies whose positions are reported
+# Largest number of bodies that are measured, smallest first; large ones are rarely thin
+_MAX_BODIES = 500
 
 
 def describe_thin(

@@ -1,8 +1,8 @@
 """Make one closed solid of a channel's surfaces, which are open where tiles meet.
 
-Neighbouring tiles have exactly the same vertices where they meet, at each level. Surfaces are
-closed at the faces of the whole block (isosurface/extract.py). So tiles need no boolean operation
-to be united: vertices at equal positions are merged. Tiles and parts that are not exported are cut
+Neighbouring tiles have exactly the same vertices where they meet, at each level of detail. Caps
+close surfaces at the ends of the built region (isosurface/extract.py). So tiles need no boolean
+operation to be united: vertices at equal positions are merged. Tiles that are not exported are cut
 off afterwards by boxes.
 
 If a tile is hidden or was moved, its neighbours are closed at the shared face (cap.py). Tiles that
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from stereocell.meshes.validity import border
 from stereocell.model.errors import StageError
 
-# Smallest length of an edge, as a share of a solid's size. Boolean operations leave shorter edges,
-# which are removed: both ends could be the same position in float32, and other programs would then
-# treat the solid as open.
+# Smallest length of an edge, as a share of the longest edge of a solid's box. Boolean operations
+# leave shorter edges, which are removed: both ends could be the same position in float32, and other
+# programs would then treat the solid as open.
 _HAIR = 1e-5
 # Overlap of neighbouring boxes, and margin to a cut, as a share of the shortest edge of all boxes
 _REACH = 3e-4
@@ -33,7 +33,8 @@ def weld(
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Join meshes; merge vertices at equal positions, and drop triangles that collapse."""
     firsts = np.cumsum([0, *(len(positions) for positions, _ in parts)])
-    places = np.concatenate([positions for positions, _ in parts]) + np.float32(0)  # no -0.0
+    # Adding 0 turns -0.0 into 0.0, so that equal positions have equal bytes.
+    places = np.concatenate([positions for positions, _ in parts]) + np.float32(0)
     triangles = np.concatenate(
         [part.astype(np.int64) + first for (_, part), first in zip(parts, firsts[:-1], strict=True)]
     )

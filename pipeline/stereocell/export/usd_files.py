@@ -24,7 +24,7 @@ from stereocell.usd.write_usdz import SIZE_M, write_usdz
 
 
 def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
-    """Write .usdz; return a sentence about it."""
+    """Write a small copy for AR viewers as .usdz; return a sentence about it."""
     channels = [channel.id for channel in chosen.channels]
     tiles = chosen.tiles
     scale = chosen.options.scale
@@ -167,6 +167,6 @@ def _relative(asset: str, folder: Path) -> str:
         return asset
     try:
         found = Path(os.path.relpath(asset, folder)).as_posix()
-    except ValueError:  # on Windows: another drive
+    except ValueError:  # on Windows, if the asset is on another drive
         return Path(asset).as_posix()
     return found if found.startswith("../") else f"./{found}"

@@ -29,12 +29,12 @@ _OFF = 1e-2  # voxels, largest distance of a tile from the lattice of the first 
 _IMAGE_AXES = np.diag([1.0, -1.0, 1.0])  # matrix from the world's axes to those of an image
 _AS_BYTES = (0.0, 255.0)  # window of 8-bit sources: the stage's bytes then are the source's values
 
-_BLOCK = 1 << 20  # bytes, size of a block of zeros
+_BLOCK = 1 << 20  # bytes of zeros that are written at a time
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The content of a file with a volume.
+    """The layout of a file with a volume: its lattice, channels and type of voxels.
 
     grid         size, spacing, origin and direction of the volume
     dtype        type of the voxels in the file
@@ -66,7 +66,7 @@ class Layout:
 
     @property
     def about(self) -> str:
-        """A phrase about size, type, channels and values."""
+        """A phrase about size, type, channels and values of the volume, for the user."""
         x, y, z = self.grid.size
         if self.is_measured:
             values = "the source's values"
@@ -250,11 +250,11 @@ def _cut(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """Return the voxels whose centres are in a region, as first and end (x, y, z) on the lattice.
 
-    Returns None if there are none. If the volumes are rotated in the world, as a scan of a patient
-    may be, this is the smallest box of the lattice around the region.
+    Returns None if no centre is in it. If the volumes are rotated in the world, as a scan of
+    a patient may be, this is the smallest box of the lattice around the region.
 
     start, steps  position of the lattice's (0, 0, 0), and its steps as rows, world um
-    first, end    voxels of all tiles on the lattice
+    first, end    first voxel and end (x, y, z) of all tiles on the lattice
     """
     if region is None:
         return first, end
@@ -270,7 +270,7 @@ def _cut(
 
 
 def _corners(low: NDArray[Any], high: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the eight corners (8, 3) of a box."""
+    """Return the eight corners (8, 3) of the box between two corners."""
     return np.array(list(product(*zip(low.tolist(), high.tolist(), strict=True))), np.float64)
 
 
@@ -292,7 +292,7 @@ def _grid(
     columns = to_source @ steps.T * factor
     spacing = np.linalg.norm(columns, axis=0)
     x, y, z = size.tolist()
-    origin = to_source @ start * factor + 0.0  # no -0.0
+    origin = to_source @ start * factor + 0.0  # turns -0.0 into 0.0
     return VoxelGrid((x, y, z), spacing, origin, columns / spacing + 0.0, unit, is_patient)
 
 

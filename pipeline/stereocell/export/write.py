@@ -45,7 +45,7 @@ _LEVELS = frozenset({"strict", "tiles", "lod", "max_triangles", "max_bytes", "re
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How the files of an ending are written.
+    """One file format of `export`: how files with its ending are written.
 
     write        writes the file at a level of detail (0 if the format has no levels), and returns a
                  sentence about the file
@@ -56,7 +56,7 @@ class Format:
     is_seen      whether the format is for viewing; then, without --channels, it has the channels
                  that the viewer shows at opening
     names_files  whether the file refers to files of OUT by path, so that OUT must be a local folder
-    beside       returns the paths of files that belong to the file
+    beside       returns the paths of further files that are written beside the file
     """
 
     write: Callable[[Chosen, Path, int], str]
@@ -138,7 +138,8 @@ def export(
             f"{file.name}: refers to files of OUT by path, expected OUT in a folder, not in "
             "object storage: export .usdz"
         )
-    files = dependencies(path, out_folder.stage_dir)  # fails for files outside of these folders
+    # This raises StageError if the stage uses files outside of the layer's and the stage's folder.
+    files = dependencies(path, out_folder.stage_dir)
     _require_outside(file, out_folder, files)
     ours = partial(is_own, out)
     line, made = _export(path, file, options=options, report=report, is_ours=ours)
@@ -177,7 +178,7 @@ def _export(
         )
     way = FORMATS[ending]
     _require_takes(ending, way.takes, options)
-    for place in (file, *way.beside(file, options)):  # before the work
+    for place in (file, *way.beside(file, options)):  # check all paths before the work begins
         require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
     _make_folder_of(file)
     with usd_boundary(stage_path):
@@ -276,7 +277,7 @@ def _folder_beside(file: Path) -> Iterator[Path]:
     try:
         folder.mkdir()
         yield folder
-    except OutputError as error:  # the message has the temporary name of the file
+    except OutputError as error:  # in the message, replace the file's temporary name
         raise OutputError(str(error).replace(str(folder / file.name), str(file))) from error
     except OSError as error:
         raise OutputError(f"{file}: can't be written: {error.strerror or error}") from error

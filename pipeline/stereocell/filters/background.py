@@ -41,7 +41,7 @@ def find_background(
     """Return the background of a channel, in voxel values.
 
     field       (z, y, x), voxel values, covering `region` at any resolution
-    region      voxels of the level that is built
+    region      box of the dataset that is built, in voxels of the built resolution level
     spacing_um  (z, y, x), of the region's level
     block_um    approximate edge of a block; knots lie at the blocks' centres and at the ends
     padding     bool (z, y, x), voxels of the field that are left out; None: none are
@@ -103,7 +103,7 @@ def _to_the_ends(lattice: LatticeField, shape: tuple[int, ...]) -> LatticeField:
 
 
 def _smooth(knots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the knots smoothed. Knots without a value take those of their neighbours."""
+    """Return the knots' values smoothed. Knots without a value take their neighbours' values."""
     is_known = np.isfinite(knots)
     if not is_known.any():
         return np.zeros_like(knots)
@@ -114,6 +114,6 @@ def _smooth(knots: NDArray[np.float64]) -> NDArray[np.float64]:
         around = ndimage.gaussian_filter(weight, sigma, mode="nearest")
         if around.min() > 1e-6:
             break
-        sigma *= 2  # there is a gap wider than the filter
+        sigma *= 2  # a gap between known values is wider than the filter
     smoothed = ndimage.gaussian_filter(filled, sigma, mode="nearest") / around
     return np.asarray(smoothed, np.float64)

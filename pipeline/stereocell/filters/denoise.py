@@ -34,10 +34,10 @@ SMOOTHING_REACH = 4.0  # radius of the Gaussian, in sigmas
 
 
 def denoise(volume: Volume, sigma_um: float, max_shift: float | None = None) -> NDArray[np.float32]:
-    """Return the voxels after a 3 x 3 median in the plane of the images and a Gaussian.
+    """Return the voxels after a 3 x 3 median within each image slice, and a 3D Gaussian.
 
-    The median removes hot voxels, which a Gaussian would spread. It is left out if the spacings in
-    that plane differ too much.
+    The median removes hot voxels, which a Gaussian would spread. It is left out if the voxel
+    spacings along the two axes of a slice differ too much.
 
     sigma_um   sigma of the Gaussian; 0 turns it off
     max_shift  largest change of a value by both filters, voxel values; None: no limit

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 CLASSES = 10
-NOISIEST = -3  # index of the class that is taken, after sorting by noise
+NOISIEST = -3  # index of the class whose noise is the result, in rising order of noise
 # Largest share of even padding, and the index of the class taken beyond it. Vessels cut out of a CT
 # scan are an example: bodies and their edges fill the rest, and six classes in ten are edges.
 MAX_EVEN, MIDDLE = 0.8, CLASSES // 2 - 1
@@ -30,7 +30,7 @@ MASK_SHIFT = 0.4  # share of a mask's step; less than .5, so that no voxel chang
 # (row, column) from a pixel to its neighbour in each direction
 _ALONG = ((0, 1), (1, 0), (1, 1), (1, -1))
 _KEPT = 0.75  # share of a class's differences, the smallest ones, that are averaged
-_OF_NORMAL = 0.43468  # that average for normal noise of standard deviation 1
+_OF_NORMAL = 0.43468  # average of these differences for normal noise of standard deviation 1
 
 
 class NoiseSample:
@@ -93,7 +93,7 @@ def _second_difference(slices: NDArray[np.float32], row: int, column: int) -> ND
 
 
 def _typical(differences: NDArray[np.float32]) -> float:
-    """Return the standard deviation of noise with such differences; the largest are edges."""
+    """Return the deviation of noise with these differences; the largest are left out as edges."""
     if not len(differences):
         return 0.0
     kept = max(1, int(_KEPT * len(differences)))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A triangle mesh.
+    """A closed triangle mesh with a name and a colour.
 
     srgb       colour, one byte for each of red, green and blue
     positions  float32 (n, 3), x, y, z, in the file's unit

@@ -6,8 +6,9 @@ little-endian.
 
 Each brick is a separate zstd frame. Its name is the first 128 bits of the SHA-256 of that frame. So
 a cache of bricks is addressed by content, and the client checks a brick before it unpacks it.
-Bricks are stored without differences and at level 3. Differences along x made them 5 % larger (7 T
-head, zstd 1 to 9), and zstd's level 9 saved 1 % of the bytes in six times the time.
+Bricks hold texels, not differences of neighbouring texels, and zstd packs them at its level 3.
+Differences along x made them 5 % larger (7 T head, zstd 1 to 9), and zstd's level 9 saved 1 % of
+the bytes in six times the time.
 """
 
 import hashlib
@@ -60,11 +61,11 @@ class Table:
     """A tree without its bricks: header and node records.
 
     size         texels (z, y, x)
-    threshold    see voxel_bvh.Bvh
+    threshold    largest invisible intensity, 0..254; -1: all texels are visible
     source       first 128 bits of the SHA-256 of the volume's KTX2 file
     nodes        records of RECORD (n,): the fields of voxel_bvh.NODE, and `length` (bytes) and
                  `hash` of the brick's zstd frame, zeros in empty nodes
-    brick_bytes  length of all frames together
+    brick_bytes  length of all zstd frames of bricks together
     """
 
     size: tuple[int, int, int]
@@ -75,17 +76,17 @@ class Table:
 
     @property
     def bytes(self) -> int:
-        """Length of the table in bytes. In a file the bricks begin there."""
+        """Length of the table in bytes. In a file, the bricks begin at this position."""
         return HEADER.size + self.nodes.nbytes
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """The content of a binary frame for one tree.
+    """A piece of a binary frame: bytes of a tree's table, or one brick of a tree.
 
     tree  number of the tree
-    at    first byte in the tree's table, or number of the node
-    data  bytes of the table, or a brick's zstd frame
+    at    table: position of the first of these bytes in it; brick: number of its node
+    data  bytes of the table, or the brick's zstd frame
     """
 
     tree: int
@@ -95,11 +96,11 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A binary frame.
+    """A binary message that the server sends: tables or bricks of trees.
 
     kind      TABLE_FRAME or BRICKS_FRAME
-    sequence  number of the frame
-    view      id of the view whose bricks the frame holds; 0 for tables
+    sequence  number of the frame in the connection
+    view      ID that the client gave the view whose bricks the frame holds; 0 for tables
     parts     content, one part after the other
     """
 
@@ -110,7 +111,7 @@ class Frame:
 
 
 def content_hash(data: bytes) -> bytes:
-    """Return the first 128 bits of SHA-256."""
+    """Return the first 128 bits of the SHA-256 of `data`."""
     return hashlib.sha256(data).digest()[:HASH_BYTES]
 
 
@@ -234,7 +235,7 @@ def parse_message(text: str) -> dict[str, Any]:
     validators = _validators()
     if not isinstance(kind, str) or kind not in validators:
         raise BrickFormatError(f"type: expected one of {', '.join(validators)}")
-    # Finding all faults would take seconds
+    # Only the first fault is found, since finding all faults of a long message would take seconds.
     fault = next(validators[kind].iter_errors(message), None)
     if fault is not None:
         where = _short(f"{fault.json_path}: {fault.validator}")

@@ -24,7 +24,7 @@ from stereocell.transfer.opacity import evaluate
 
 _MAGIC = b"\x76\x2f\x31\x01"
 _OTHER_LAYOUTS = 0x200 | 0x800 | 0x1000  # bits of the version: tiles, deep data, several parts
-# Rows of pixels in a chunk, by compression
+# Number of pixel rows in a chunk, by OpenEXR's code of the compression
 _ROWS_OF = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256}
 _LEVELS = (np.arange(256, dtype=np.float32) / 255).astype(np.float16)
 
@@ -45,7 +45,8 @@ def write_atlas(path: Path, volume: NDArray[np.uint8]) -> None:
     True
     """
     depth, height, width = volume.shape
-    columns = min(depth, max(1, round((depth * height / width) ** 0.5)))  # nearly square
+    # With this number of columns, the atlas is nearly square.
+    columns = min(depth, max(1, round((depth * height / width) ** 0.5)))
     rows = -(-depth // columns)
     slices = np.zeros((rows * columns, height, width), dtype=np.uint8)
     slices[:depth] = volume
@@ -87,7 +88,7 @@ def read_atlas(path: Path) -> NDArray[np.uint8]:
         )
     if image.dtype == np.float16:
         sheet = _bytes_of_halves()[image.view(np.uint16)]
-    else:  # from another program
+    else:  # another program wrote values of another type than half floats
         sheet = _to_bytes(image)
     slices = sheet.reshape(rows, height, columns, width).transpose(0, 2, 1, 3)
     return np.ascontiguousarray(slices.reshape(-1, height, width)[:depth])

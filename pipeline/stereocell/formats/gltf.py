@@ -37,7 +37,8 @@ from stereocell.model.version import GENERATOR
 
 _METRES_PER_UM = 1e-6
 _MAX_STEPS = 0xFFFF  # largest number of steps along an axis: 16 bits
-# Steps along an axis, a 20th of a voxel each; more low bits would not compress
+# Wanted number of lattice steps along a tile's longest edge, about 20 for each voxel; more low bits
+# would not compress
 _WANTED_STEPS = 1 << 14
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5121, 5123, 5126
 AMBIENT_SHARE = 0.4  # approximate share of ambient light in the viewer's scene, 0..1
@@ -114,13 +115,13 @@ def encode_glb(
     textures: Textures | None = None,
     features: Features | None = None,
 ) -> Glb:
-    """Return the mesh as .glb.
+    """Return a mesh as the content of a .glb file.
 
     mesh      positions float32 (n, 3) in um (x, y, z), triangles uint32 (m, 3), normals
     step_m    step of the lattice in metres, see `choose_step`
-    extras    written on the only node
+    extras    texts for the `extras` of the file's only node
     textures  UVs are written only if there is a map, and tangents only if it is a normal map
-    features  table of the objects, if the mesh has some, by their numbers in the tile
+    features  table of the tile's objects, in the order of their numbers; None: no table is written
 
     Raises ValueError for a mesh without triangles, for one larger than 65535 steps along an axis,
     and for maps without UVs. It does so too for objects that share a triangle, and for more than
@@ -223,7 +224,8 @@ def encode_glb(
             }
         ]
     if features is not None:
-        of_objects = ["EXT_mesh_features", "EXT_structural_metadata"]  # not required for drawing
+        # These extensions are not required: a viewer can draw the mesh without them.
+        of_objects = ["EXT_mesh_features", "EXT_structural_metadata"]
         document["extensionsUsed"] = [*extensions, *of_objects]
         ids, metadata = describe_features(buffers, features, extras.get("channel", name))
         primitive["extensions"] = {"EXT_mesh_features": ids}

@@ -30,7 +30,7 @@ _CHANNEL_TYPES = (0, 1, 2, 15)  # red, green, blue, alpha
 _ORIENTATIONS = {2: "rd", 3: "rdo"}
 _ZSTD = 2
 _MAX_BYTES = 1 << 31  # largest number of bytes of a level that is read
-_ZSTD_LEVEL = 3  # 9 made noisy 8-bit volumes 1 to 2 % smaller and took 3 to 5 times as long
+_ZSTD_LEVEL = 3  # level 9 made noisy volumes 1 to 2 % smaller, in 3 to 5 times the time
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Ktx2:
 
 
 def encode_3d(levels: Sequence[NDArray[np.uint8]]) -> Ktx2:
-    """Return a 3D texture.
+    """Return a 3D texture with its mip levels as a KTX2 file.
 
     levels  finest first, each uint8 (z, y, x) or (z, y, x, components). Components: 1 (R8),
             2 (R8G8) or 4 (R8G8B8A8), UNORM
@@ -73,7 +73,7 @@ def encode_3d(levels: Sequence[NDArray[np.uint8]]) -> Ktx2:
 
 
 def encode_2d(image: NDArray[np.uint8]) -> Ktx2:
-    """Return a 2D texture of one level.
+    """Return a 2D texture of one mip level as a KTX2 file.
 
     image  uint8 (y, x, components), row 0 first
     """

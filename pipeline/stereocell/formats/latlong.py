@@ -46,7 +46,7 @@ def read_latlong(file: Path) -> Radiance:
 
 
 def _reduced(image: NDArray[np.floating]) -> Radiance:
-    """Return means of square blocks, at most MAX_COLUMNS in a row; the last may be smaller."""
+    """Return means of squares of texels, at most MAX_COLUMNS in a row; the last may be smaller."""
     factor = -(-image.shape[1] // MAX_COLUMNS)
     if factor == 1:
         return image.astype(np.float32)
@@ -57,7 +57,7 @@ def _reduced(image: NDArray[np.floating]) -> Radiance:
 
 
 def turned(image: Radiance, matrix: NDArray[np.float64]) -> Radiance:
-    """Return the image of light from a scene that is turned.
+    """Return an image of light that is rotated with its scene, from its own axes to the world.
 
     matrix  (3, 3) from the image's axes to the world, for row vectors; its scale does not matter
     """

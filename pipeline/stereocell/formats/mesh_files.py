@@ -1,8 +1,8 @@
 """Write bodies as PLY or OBJ, by trimesh.
 
 The other formats have their own writers here. trimesh's 3MF lacks units, colours and slicers' lists
-of parts, and its glTF holds the whole scene in memory. STL is also the result of a step, and each
-worker of a build would need a second to import trimesh.
+of parts, and its glTF holds the whole scene in memory. A build also writes STL, and each of its
+worker processes would need a second to import trimesh.
 """
 
 import math

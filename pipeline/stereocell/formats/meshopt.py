@@ -72,7 +72,7 @@ class CompressedBuffers:
         """Store one row per vertex; return the accessor's index.
 
         values    (n, k), rows of 4, 8, ... bytes
-        accessor  its glTF properties without the count
+        accessor  glTF properties of the accessor, without the count
         """
         count, stride = len(values), values.itemsize * values.shape[1]
         # The extension requires version 0 of the vertex codec.
@@ -145,7 +145,7 @@ def _offset(start: int) -> dict[str, int]:
 
 
 def _octahedral(directions: NDArray[np.float64]) -> NDArray[np.int8]:
-    """Return signed bytes (n, 4): x and y on the octahedron, the value of 1, and the sign or 0."""
+    """Return bytes (n, 4): x, y on the octahedron, the byte that means 1, a tangent's sign or 0."""
     x, y, z = (directions[:, :3] / np.abs(directions[:, :3]).sum(axis=1, keepdims=True)).T
     below = z < 0  # the lower half is folded over the edges of the upper half
     u = np.where(below, np.copysign(1 - np.abs(y), x), x)

@@ -64,7 +64,8 @@ def write_probabilities(
         }
     }
     files: dict[str, Buffer] = {}
-    # In memory first, because zarr writes from its own threads, which would outlive an exception.
+    # The files are made in memory, because zarr writes from its own threads, which would outlive an
+    # exception.
     group = zarr.open_group(MemoryStore(files), mode="w", zarr_format=3, attributes=attributes)
     array = group.create_array(
         "0",

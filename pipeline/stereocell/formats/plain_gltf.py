@@ -29,7 +29,7 @@ _MAX_BYTES = 2**32 - 1  # largest size of a .glb in bytes, since its length is a
 
 
 class Buffers(Protocol):
-    """A store for the numbers of meshes."""
+    """A store for the vertices and indices of a glTF file's meshes."""
 
     extensions: tuple[str, ...]
 

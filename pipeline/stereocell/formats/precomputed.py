@@ -26,14 +26,14 @@ Encode = Callable[..., bytes]
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A level of a mesh: positions float64 (n, 3), nm; triangles uint32 (m, 3)."""
+    """A mesh at one level of detail: positions float64 (n, 3), nm; triangles uint32 (m, 3)."""
 
     positions: NDArray[np.float64]
     triangles: NDArray[np.uint32]
 
     @property
     def edge_nm(self) -> float:
-        """The approximate length of an edge, which is what the level resolves."""
+        """The approximate length of a triangle's edge, which is the level's smallest detail."""
         a, b, c = self.positions[self.triangles].transpose(1, 0, 2)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
         return float(np.sqrt(2 * area / max(len(self.triangles), 1)))
@@ -48,7 +48,7 @@ def write_info(folder: Path, content: dict[str, Any]) -> None:
 def write_volume(
     folder: Path, scales: Sequence[tuple[NDArray[Any], tuple[float, float, float]]]
 ) -> None:
-    """Write an image.
+    """Write an image as chunks of voxels, at one or more resolution levels.
 
     scales  finest first: voxels (channel, z, y, x), and the voxel spacing (x, y, z) in nm
     """

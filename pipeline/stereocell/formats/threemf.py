@@ -58,7 +58,7 @@ _MATERIALS, _WHOLE, _FIRST = 1, 2, 3  # IDs in the model: colours, the object, i
 def write_3mf(
     path: Path, bodies: Sequence[Body], *, title: str, unit: str, components: bool = False
 ) -> None:
-    """Write the bodies as parts of one object. unit: of their numbers, one of UNITS.
+    """Write the bodies as parts of one object. `unit`: unit of the positions, a key of UNITS.
 
     Where parts overlap, slicers print the later one.
     """

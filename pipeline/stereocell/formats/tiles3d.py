@@ -33,7 +33,9 @@ _METRES_PER_UM = 1e-6
 _NM_PER_METRE = 1e9
 CONTENT_HASH = "sha-256-128"  # key in the extras of a content
 _CONTENT_HASH_BYTES = 16
-_ROOT_ERROR = 100.0  # diagonals of the channel; so large that readers always draw something
+# Error of the root tile (geometricError), as a multiple of the diagonal of the channel's box. It is
+# so large that readers always draw at least the coarsest LODs.
+_ROOT_ERROR = 100.0
 # Largest number of tiles that one file describes with all LODs; 59 kB with four LODs each
 MAX_WHOLE_TILES = 64
 TILESET = "tileset.json"
@@ -106,7 +108,7 @@ def _tileset(root: dict[str, Any], error: float) -> dict[str, Any]:
     return {
         "asset": {"version": "1.1", "extras": {"generator": GENERATOR}},
         "geometricError": error,
-        "root": {**root, "refine": "REPLACE"},  # all tiles below inherit it
+        "root": {**root, "refine": "REPLACE"},  # all tiles below the root inherit `refine`
     }
 
 
@@ -143,7 +145,7 @@ class _Box:
 
     @classmethod
     def around(cls, lods: Sequence[TileLod]) -> "_Box":
-        """Return the box of all LODs, rounded outwards. A tile's box contains its children's."""
+        """Return the box of all LODs, rounded outwards; it must contain the boxes of children."""
         lows = zip(*(lod.min_m for lod in lods), strict=True)
         highs = zip(*(lod.max_m for lod in lods), strict=True)
         return cls._evened(
@@ -172,7 +174,7 @@ class _Box:
         """Return centre and half axes in metres, z up, 12 numbers."""
         centre = [(a + b) // 2 for a, b in zip(self.low, self.high, strict=True)]
         half = [(b - a) // 2 for a, b in zip(self.low, self.high, strict=True)]
-        cx, cy, cz = (n / _NM_PER_METRE for n in centre)  # gives the shortest decimals
+        cx, cy, cz = (n / _NM_PER_METRE for n in centre)  # in metres, whole nm give short decimals
         hx, hy, hz = (n / _NM_PER_METRE for n in half)
         return [cx, 0 - cz, cy, hx, 0, 0, 0, hz, 0, 0, 0, hy]
 

@@ -10,12 +10,12 @@ _LOD = re.compile(r"lod(\d+)\.glb$")
 
 
 def is_surface(path: str) -> bool:
-    """Return whether a path is that of a level's surface file."""
+    """Return whether a path is that of a surface at some level of detail, such as lod1.glb."""
     return _LOD.search(path) is not None
 
 
 def surfaces(tile: Tile) -> Iterator[tuple[str, int]]:
-    """Yield the address and the level of each surface of a tile and its descendants."""
+    """Yield the address and the level of detail of each surface of a tile and its descendants."""
     uri = tile.get("content", {}).get("uri", "")
     if found := _LOD.search(uri):
         yield uri, int(found[1])
@@ -24,7 +24,7 @@ def surfaces(tile: Tile) -> Iterator[tuple[str, int]]:
 
 
 def inlined(tile: Tile, read: Callable[[str], Tile], below: str = "") -> Tile:
-    """Return a tile with the tilesets that it names in place of their names.
+    """Return a tile in which each reference to a nested tileset is replaced by that tileset's root.
 
     read  returns the root of the tileset at an address
     """
@@ -41,7 +41,7 @@ def inlined(tile: Tile, read: Callable[[str], Tile], below: str = "") -> Tile:
 
 
 def without_finer(tile: Tile, finest: int) -> Tile:
-    """Return a tile without surfaces finer than a level. Its own surface stays."""
+    """Return a tile of a tileset without surfaces finer than a level. Its own surface stays."""
     children = tile.get("children", [])
     if "content" in tile:
         children = [one for one in children if any(lod >= finest for _, lod in surfaces(one))]

@@ -19,10 +19,10 @@ _REMEDY = "run `stereocell bundle OUT`"
 class Content:
     """A file that a tileset names: a surface, or an external tileset.
 
-    tileset  the JSON file that names it
-    path     path in the bundle
+    tileset  the JSON file that names this file
+    path     path of this file in the bundle
     named    entry in that file: `uri`, `extras`
-    error_m  geometricError of its tile, metres
+    error_m  geometricError of the tile that has this content, metres
     limit_m  geometricError of the tile's parent, metres
     boxes    boxes of the tile, its parent and so on: 12 numbers each, metres, z up
     """

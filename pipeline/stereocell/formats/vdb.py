@@ -65,7 +65,7 @@ _Leaves = tuple[NDArray[Any], NDArray[np.int64]]
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """A grid to write.
+    """A grid of an OpenVDB file that is to be written.
 
     voxels  (x, y, z), the grid's numbers; uint8 if `is_half`
     first   index (i, j, k) of the first voxel
@@ -90,11 +90,11 @@ def write_vdb(
     """Write a file with the grid `density`, which is `density` / 255, and maybe `measured`.
 
     density     uint8 (z, y, x), image rows downwards
-    first_um    centre of its voxel (0, 0, 0), (z, y, x)
-    spacing_um  (z, y, x)
+    first_um    centre of voxel (0, 0, 0) of `density`, (z, y, x)
+    spacing_um  voxel spacing (z, y, x)
     measured    (z, y, x), numbers that float32 can hold. It has `apron` voxels more than the
                 density at the start of each axis, and any number at the end
-    apron       see `measured`
+    apron       number of voxels by which `measured` begins before `density`
 
     Grid index (i, j, k) is world (x, y, z), in both grids. Rows are reversed, so that j grows
     upwards like the world's y, and the transform has only positive scales: some clients treat a
@@ -236,7 +236,8 @@ def _cut_leaves(grid: _Grid) -> _Leaves:
 
 def _topology(grid: _Grid, origins: NDArray[np.int64], masks: NDArray[np.uint8]) -> bytes:
     """Return the tree without the values of its leaves."""
-    nothing = b"" if grid.is_half else bytes(8)  # floats have a length even without values
+    # A grid of floats states the length of the values of a node even if it has no values.
+    nothing = b"" if grid.is_half else bytes(8)
     roots = _runs(origins // (NODE4 * NODE5))
     parts = [struct.pack("<ifII", 1, float(grid.background), 0, len(roots))]
     for start, stop in roots:

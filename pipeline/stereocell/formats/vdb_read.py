@@ -39,7 +39,9 @@ class VdbGrid:
     spacing  float64 (3,), distance between voxels along x, y, z, in the file's units
     origin   float64 (3,), centre of voxel (0, 0, 0), x, y, z, in the file's units
     tree     type of the tree
-    start    byte at which the grid begins, after its descriptor; `blocks`: its leaves; `end`
+    start    position of the grid's first byte, after its descriptor
+    blocks   position of the first byte of its leaves' values
+    end      position after the grid's last byte
     """
 
     name: str
@@ -85,7 +87,7 @@ def _read_grids(file: BinaryIO, count: int) -> Iterator[VdbGrid]:
         if _text(file) in _MAPS:
             numbers = np.frombuffer(file.read(48), dtype="<f8")
             origin, spacing = numbers[:3], numbers[3:]
-        # If two grids have the same name, a counter follows it after a separator.
+        # If two grids have the same name, a separator and a counter follow the name.
         yield VdbGrid(name.split("\x1e")[0], spacing, origin, tree, start, blocks, end)
         file.seek(end)
 

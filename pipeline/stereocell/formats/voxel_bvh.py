@@ -53,7 +53,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class Bvh:
-    """The tree of one volume.
+    """The octree of bricks over one volume.
 
     size       texels (z, y, x) of the volume, with the apron
     threshold  largest invisible intensity, 0..254; -1: all texels are visible
@@ -81,7 +81,7 @@ class Bvh:
 
 
 def build(volume: Bytes3, threshold: int) -> Bvh:
-    """Return the tree of a volume.
+    """Return the octree of bricks over a volume.
 
     volume     uint8 (z, y, x)
     threshold  largest invisible intensity, 0..254; -1: all texels are visible
@@ -144,7 +144,7 @@ def build(volume: Bytes3, threshold: int) -> Bvh:
 def upsampling(level: int, count: int) -> Floats:
     """Return the weights that interpolate a brick's row at finest texel centres.
 
-    level   level of the brick
+    level   level of the brick's node, 0: a leaf
     count   finest texels along the box's axis
     result  float32 (count, 18)
 
@@ -184,12 +184,13 @@ def _halve(values: NDArray[np.uint8] | Floats, axis: int) -> Floats:
 
 
 def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
-    """Return, for each level, the rounded mean of the texels in each of its nodes' boxes."""
+    """Return, for each tree level, the rounded mean of the texels in the box of each node."""
     sums: NDArray[Any] = volume
     counts = np.ones((1, 1, 1), dtype=np.int64)
     for axis, n in enumerate(volume.shape):
         starts = np.arange(0, n, STREAM_BRICK)
-        sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.uint32)  # at most 16^3 * 255
+        # The sum over a brick is at most 16^3 * 255, which uint32 holds.
+        sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.uint32)
         shape = [1, 1, 1]
         shape[axis] = len(starts)
         counts = counts * np.diff(np.append(starts, n)).reshape(shape)
@@ -203,7 +204,7 @@ def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
 
 
 def _pad(level: Bytes3, grid: tuple[int, ...]) -> Bytes3:
-    """Return the texels of a level's bricks, with an apron, and with whole bricks at the end."""
+    """Return the texels of a mip level, with an apron, and with whole bricks at the ends."""
     widths = [(1, g * STREAM_BRICK + 1 - n) for g, n in zip(grid, level.shape, strict=True)]
     return np.pad(level, widths, mode="edge")
 
@@ -235,7 +236,7 @@ def _reduce_children(ufunc: np.ufunc, values: NDArray[Any], neutral: int) -> NDA
 
 
 def _cut(padded: Bytes3, places: NDArray[np.int64]) -> Bytes3:
-    """Return the bricks (n, 18, 18, 18) at these places (z, y, x) of a padded level."""
+    """Return the bricks (n, 18, 18, 18) at these brick indices (z, y, x) of a padded mip level."""
     windows = np.lib.stride_tricks.sliding_window_view(padded, (STORED,) * 3)
     bricks: Bytes3 = windows[::STREAM_BRICK, ::STREAM_BRICK, ::STREAM_BRICK][tuple(places.T)]
     return bricks
@@ -269,7 +270,7 @@ def _error(
         flat = difference.ravel()
         largest = max(largest, flat.max(), -flat.min())
         squares += float(np.dot(flat, flat))
-    # float32 is off by about 1e-5 where the difference is a whole number.
+    # Rounding errors of float32, about 1e-5, must not raise a whole difference to the next number.
     return int(np.ceil(min(float(largest) - 1e-3, 255))), float(np.sqrt(squares / box.size))
 
 

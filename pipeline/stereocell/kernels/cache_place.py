@@ -1,6 +1,6 @@
-"""Where compiled kernels are cached, and whether all of them are. Imports do not include numba.
+"""Find the cache of compiled kernels, and whether all kernels are in it, without importing numba.
 
-The place is the first of these that can be written: the folder named by NUMBA_CACHE_DIR,
+The cache is the first of these folders that can be written: the folder named by NUMBA_CACHE_DIR,
 `__pycache__` beside the kernels, or the user's cache. It holds one folder for each module. The
 folder's name is a hash of the module and of the kernels that it imports, because numba does not
 notice that a called function in another file has changed.
@@ -26,9 +26,9 @@ _IMPORT = re.compile(r"^from stereocell\.kernels\.(\w+) import", re.MULTILINE)
 
 @cache
 def find_home() -> Path | None:
-    """Return the place of the cache, or None if no folder can be written.
+    """Return the folder of the cache, or None if no folder can be written.
 
-    Without a place each process compiles the kernels that it needs.
+    Without this folder, each process compiles the kernels that it needs.
     """
     named = os.environ.get("NUMBA_CACHE_DIR")
     for home in [Path(named)] if named else [_HERE / "__pycache__", _user_cache()]:
@@ -41,13 +41,13 @@ def find_home() -> Path | None:
 
 @cache
 def cache_folder(module: str) -> Path | None:
-    """Return the folder of a module's compiled kernels, or None if there is no place."""
+    """Return the folder of a module's compiled kernels, or None if there is no cache."""
     home, name = find_home(), module.rpartition(".")[2]
     return home and home / f"{_PREFIX}{name}-{_digest(_reach(name))}"
 
 
 def are_compiled() -> bool:
-    """Return whether all kernels are compiled on this machine, or there is no place for them."""
+    """Return whether all kernels are compiled on this machine, or there is no cache for them."""
     mark = _mark()
     return mark is None or mark.exists()
 
@@ -58,7 +58,7 @@ def compile_in_process() -> None:
 
 
 def mark_compiled() -> None:
-    """Record that all kernels are compiled, and remove those of older versions."""
+    """Record that all kernels are compiled, and remove compiled kernels of older versions."""
     home, mark = find_home(), _mark()
     if home is None or mark is None:
         return

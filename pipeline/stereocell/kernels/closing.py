@@ -29,6 +29,8 @@ def _square_in_plane(
     out    (height, width), written; values are at most `far`
     lines  (height, width), working memory
     reach  number of rows that are examined on each side
+    hy     distance of neighbouring rows, um; hx: of neighbouring pixels in a row
+    far    largest squared distance that is needed, um^2
     """
     height, width = solid.shape
     square = np.float32(hx) * np.float32(hx)

@@ -67,16 +67,19 @@ from stereocell.kernels.rings import NEIGHBOURS, Flags, Mesh, Ring, make_mesh, m
 from stereocell.kernels.surface_rings import fill_fans, find_cheapest_in_fan, stamp_fan
 from stereocell.kernels.triangles import Points
 
-PASSES = 4  # largest number of passes over one class of cost; the last class has LAST
+PASSES = 4  # largest number of passes over one class of cost; for the last class, it is LAST
 LAST = 40
-SHARPER = 0.36  # square of .6, the least share of the sharpest angle: 1 - cos grows as its square
-BLOCK = 4096  # vertices that are processed together
+# Square of .6. If triangles around a vertex are sharper than the bound, a collapse may leave .6 of
+# their sharpest angle. The code compares 1 - cos, which grows with the square of an angle.
+SHARPER = 0.36
+BLOCK = 4096  # number of vertices, near one another, that are processed together
 
 
 class Limits(NamedTuple):
-    """How far a collapse may go."""
+    """The bounds that a collapse must keep, and the number of vertices in a block."""
 
-    stray: float  # largest distance of a vertex from the result, summed over collapses, in errors
+    # Largest distance of a vertex from the result, summed over collapses; multiple of its error
+    stray: float
     sharpest: float  # cosine of the smallest angle that a triangle may have
     block: int  # vertices that go through all classes of cost before the next ones do
 
@@ -114,7 +117,7 @@ def collapse(
     errors     float64 (n,), largest root of the mean squared distance from the planes; equal for
                all vertices of a connected component
     stray, sharpest  see `Limits`
-    past       int32 (k, 2), collapses of an earlier try with fewer locked vertices; (0, 2) without
+    past       int32 (k, 2), collapses of an earlier try with fewer locked vertices; (0, 2): none
     caps       uint8 (n,), a bit for each cap that a vertex lies in; None: there are no caps
     result     triangles int32 (m, 3) by the vertices that are left; bool (m,), triangles that are
                left; int32 (k, 2), collapses: a vertex, and the one onto which it has moved
@@ -168,7 +171,7 @@ def collapse_interfaces(
 def _run(
     mesh: Mesh, at: Points, triangles: Ints, past: Ints, limits: Limits
 ) -> tuple[Ints, Flags, Ints]:
-    """Return the result of `collapse` for a surface with edges, or for interfaces."""
+    """Return the result of `collapse` for a surface, or for interfaces."""
     n, is_a_surface = len(at), len(mesh.on_line) == 0
     work = Work(
         ring=make_ring(n, is_surface=is_a_surface),
@@ -197,7 +200,7 @@ def collapse_in_place(mesh: Mesh, triangles: Ints, past: Ints, work: Work, limit
     find_costs(mesh, work)
     n, block, turn = len(mesh.at), limits.block, 0
     blocks = -(-n // block) if n > block and len(past) == 0 else 0
-    for number in range(blocks + 1):  # the last one is the whole mesh
+    for number in range(blocks + 1):  # after the blocks, the whole mesh
         is_last = number == blocks
         low, high = (0, n) if is_last else (number * block, min((number + 1) * block, n))
         for limit in range(CLASSES + 1):
@@ -266,7 +269,7 @@ def find_costs(mesh: Mesh, work: Work) -> None:
 def try_collapse(u: int, limit: int, mesh: Mesh, work: Work, limits: Limits) -> int:
     """Move u onto its cheapest neighbour for which the collapse is allowed.
 
-    limit  highest class of cost
+    limit  highest class of cost that is allowed now
     result this neighbour, or -1 if there is none
     """
     ring, costs = work.ring, work.costs
@@ -330,7 +333,7 @@ def find_cost_after(v: int, limit: int, mesh: Mesh, ring: Ring) -> int:
 
 @step
 def price_neighbours(u: int, mesh: Mesh, ring: Ring) -> int:
-    """Write the price of moving u onto each neighbour; return the number of the cheapest.
+    """Write the price of moving u onto each neighbour; return the index of the cheapest neighbour.
 
     The price is infinite where u would leave its line or its cap.
     """
@@ -349,7 +352,7 @@ def price_neighbours(u: int, mesh: Mesh, ring: Ring) -> int:
 
 @step
 def find_cheapest(ring: Ring) -> int:
-    """Return the number of the neighbour with the least price; of equal ones, the first."""
+    """Return the index of the neighbour with the least price; of equal ones, the first."""
     cheapest = 0
     for j in range(1, ring.sizes[NEIGHBOURS]):
         if ring.price[j] < ring.price[cheapest]:

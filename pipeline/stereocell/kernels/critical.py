@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints
 
-WIDTH = 8  # largest number of voxels of a place
+WIDTH = 8  # largest number of voxels that describe a place, see `find_critical`
 
 
 @part
@@ -51,7 +51,7 @@ def find_critical(labels: Ints, most: int) -> tuple[NDArray[np.int64], int]:
                     continue
                 for corner in range(4):
                     p = i + (corner // 2) * steps[1] + (corner % 2) * steps[2]
-                    # o is the corner opposite p.
+                    # In the cube of 2 x 2 x 2 voxels, corner o is opposite to corner p.
                     o = i + steps[0] + (1 - corner // 2) * steps[1] + (1 - corner % 2) * steps[2]
                     a, b, rest = flat[p], flat[o], -1
                     is_lone, is_hole = a == b and a > 0, True

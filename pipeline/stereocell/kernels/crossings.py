@@ -34,7 +34,7 @@ def _sign(
     wy: float,
     wz: float,
 ) -> int:
-    """Return the sign of the volume of three vectors (differences of points), or UNSURE."""
+    """Return the sign of the volume that three vectors (differences of points) span, or UNSURE."""
     p1, p2, q1, q2, r1, r2 = vy * wz, vz * wy, vz * wx, vx * wz, vx * wy, vy * wx
     volume = ux * (p1 - p2) + uy * (q1 - q2) + uz * (r1 - r2)
     size = (abs(p1) + abs(p2)) * abs(ux) + (abs(q1) + abs(q2)) * abs(uy)
@@ -284,7 +284,7 @@ def find_candidates(
     edge: float,
     shape: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """Return the pairs of triangles (n, 2) that may intersect and have a changed one.
+    """Return the pairs of triangles (n, 2) that may intersect, if one of the pair has changed.
 
     fresh                               bool (m,), triangles that have changed
     spread                              vertices from `find_spread`, where triangles do not
@@ -300,7 +300,7 @@ def find_candidates(
     # For the triangles of one cell, side by side in memory: their boxes and corners, and the axes
     # along which their boxes start in the cell
     boxes, corners = np.empty((most, 6)), np.empty((most, 3), np.int32)
-    # -1 if triangles may intersect away from this corner
+    # Vertex of each corner; -1 if it is not in `spread`, so that triangles may intersect around it
     round_corners = np.empty((most, 3), np.int32)
     starts, due = np.empty(most, np.int8), np.empty(most, np.bool_)
     for c in range(len(first) - 1):

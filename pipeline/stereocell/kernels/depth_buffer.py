@@ -35,7 +35,8 @@ def find_visible(
                 b = (x * acy - y * acx) / twice
                 c = (abx * y - aby * x) / twice
                 a = 1 - b - c
-                if -a * over_a > 1e-9 or -b * over_b > 1e-9 or -c * over_c > 1e-9:  # pixels
+                # A pixel counts as inside up to 1e-9 pixels beyond an edge.
+                if -a * over_a > 1e-9 or -b * over_b > 1e-9 or -c * over_c > 1e-9:
                     continue
                 here = depth[triangle, 0] * a + depth[triangle, 1] * b + depth[triangle, 2] * c
                 if here > nearest[row, column]:

@@ -45,9 +45,9 @@ def fill_records(triangles: Ints, twins: Ints, leaving: Ints, edges: Ints) -> No
 
 @part
 def count_common(h: int, edges: Ints, stamp: Ints, tick: int) -> tuple[int, int]:
-    """Return how many neighbours of the target have the stamp, and how many neighbours it has.
+    """Return how many neighbours of a half-edge's end are stamped, and how many it has in all.
 
-    h  the half-edge to the target
+    h  the half-edge; `tick`: value of `stamp` for stamped vertices
     """
     common, valence = 0, 0
     start = edges[h + TWIN]

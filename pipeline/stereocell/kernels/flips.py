@@ -12,7 +12,7 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints, count_fans, following, match_twins, preceding
 from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_cosine
 
-ROUNDS = 8
+ROUNDS = 8  # largest number of rounds over all due edges
 GAIN = 1e-3  # least gain in the smallest angle, as a difference of cosines
 # Squared cosine of the largest turn of a triangle from the mean normal of both: 45 degrees
 TURN = 0.5

@@ -78,7 +78,7 @@ def divide_by_slopes(field: Field, steps: Row, least: float, limit: float) -> No
 
 @kernel
 def move_off_zero(values: Field, least: np.float32) -> None:
-    """Move values (z, y, x) nearer to zero than `least` to +- least, in place; zero becomes -."""
+    """Move values (z, y, x) nearer to 0 than `least` to +- least, in place; 0 becomes -least."""
     for z in range(values.shape[0]):
         for y in range(values.shape[1]):
             row = values[z, y]

@@ -8,7 +8,8 @@ from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_co
 from stereocell.kernels.union_find import link, number_components
 
 Ints = NDArray[np.int32]
-# No twin: the edge has one triangle; it has several, or two of opposite winding
+# Values in place of a twin. BORDER: the edge has one triangle. CROWDED: it has more than two
+# triangles, or two whose windings do not agree.
 BORDER, CROWDED = -1, -2
 
 
@@ -39,7 +40,8 @@ def match_twins(triangles: Ints, count: int) -> Ints:
     for v in range(count):
         first[v + 1] += first[v]
     place, listed = first[:-1].copy(), np.empty(edges, np.int32)
-    far, upward = np.empty(edges, np.int32), np.empty(edges, np.bool_)  # in the order of the lists
+    # For each listed half-edge, its higher vertex, and whether it ends there
+    far, upward = np.empty(edges, np.int32), np.empty(edges, np.bool_)
     for h in range(edges):
         start, end = corner[h], corner[following(h)]
         v = min(start, end)

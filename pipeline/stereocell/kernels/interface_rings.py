@@ -73,7 +73,7 @@ def _find_order(ring: Ring) -> int:
 
 @step
 def fill_sheets(mesh: Mesh, triangles: Ints) -> None:
-    """Write the half-edges of interfaces."""
+    """Write the half-edges of interfaces into the mesh."""
     mesh.start[:] = -1
     for t in range(len(triangles) - 1, -1, -1):
         for k in range(2, -1, -1):
@@ -84,7 +84,7 @@ def fill_sheets(mesh: Mesh, triangles: Ints) -> None:
 
 @step
 def collect_triangles(u: int, mesh: Mesh, ring: Ring) -> bool:
-    """Write the triangles around u; return whether there is space for all."""
+    """Write the triangles around u into the ring; return whether there is space for all."""
     size, h = 0, mesh.start[u]
     while h >= 0:
         if mesh.is_left[h // RECORD]:
@@ -142,7 +142,7 @@ def check_sheets_link(mesh: Mesh, ring: Ring, chosen: int, other: Ring) -> bool:
 
 @step
 def find_beyond(v: int, ring: Ring) -> int:
-    """Return the neighbour along the line of the ring's vertex on the other side than v."""
+    """Return the neighbour on the line of the ring's vertex that is not v; -1: there is none."""
     beyond = -1
     for j in range(ring.sizes[NEIGHBOURS]):
         if ring.shared[j] != 2 and ring.near[j] != v:

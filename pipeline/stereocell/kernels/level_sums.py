@@ -26,8 +26,8 @@ def sum_by_value(
 
     field, padding  (z, y, x), a window around the voxels that are counted
     steps           spacing (z, y, x)
-    table           the bin of each even step from `low`; values beyond an end count in the end bins
-    low, step       least value and step of the table
+    table           bin of values from low + k * step on; a value beyond an end counts as that end
+    low, step       least value of the table, and the difference between its values
     span            unit of the slopes in the third sum
 
     The three sums are the number of voxels, their slopes, and their squared slopes in units of

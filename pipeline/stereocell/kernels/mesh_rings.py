@@ -50,7 +50,7 @@ def collect_again(u: int, v: int, mesh: Mesh, ring: Ring) -> int:
 
 @step
 def mark_ring(u: int, mesh: Mesh, ring: Ring, marks: Flags) -> None:
-    """Mark the neighbours of u."""
+    """Set the marks of all neighbours of the vertex u to True."""
     if is_surface(mesh):
         mark_fan(u, mesh, marks)
     else:

@@ -22,7 +22,7 @@ SURE = 1 - 1e-9  # share of a class's bound; a lower price is in no higher class
 @part
 def price_of(quadrics: Points, u: int, at: Points, v: int) -> float:
     """Return the mean squared distance of v from u's planes, in squares of u's error."""
-    # Elements are indexed singly, because references to a view of a row would be counted.
+    # Elements are indexed singly, because numba would count references to an array of one row.
     x, y, z = at[v, 0], at[v, 1], at[v, 2]
     square = quadrics[u, 0] * x * x + quadrics[u, 1] * y * y + quadrics[u, 2] * z * z
     square += quadrics[u, 9]

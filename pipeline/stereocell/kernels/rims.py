@@ -23,7 +23,9 @@ from stereocell.kernels.triangles import Points
 
 STEPS = 4  # number of steps in which the error grows to its bound, so that flat parts go first
 PASSES = 6  # largest number of passes over one step
-SHARPER = 0.1  # square of the least share of the sharpest angle, since 1 - cos grows as its square
+# Square of .32. If triangles around a vertex are sharper than the bound, a move may leave .32 of
+# their sharpest angle. The code compares 1 - cos, which grows with the square of an angle.
+SHARPER = 0.1
 
 
 @part
@@ -84,8 +86,8 @@ def thin_rim(
     planes     uint8 (n,), a bit for each cut plane that a vertex lies in, including this one
     locked     bool (n,), vertices that stay
     error      largest distance of a vertex from the remaining curve
-    sharpest   cosine of the smallest angle that a triangle may have; if triangles around are
-               sharper already, the bound is lower
+    sharpest   cosine of the smallest angle that a triangle may have; the angle may be smaller where
+               triangles are sharper already
     """
     n = len(at)
     mesh = make_mesh(n, len(triangles), planes=planes)

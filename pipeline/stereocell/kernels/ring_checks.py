@@ -20,9 +20,11 @@ SLIVER = 0.9945  # cosine of 6 degrees; the normal of a sharper triangle is not 
 
 @step
 def measure_ring(u: int, mesh: Mesh, ring: Ring, by_area: bool) -> tuple[Triple, float]:
-    """Return the sum of the doubled areas around u, and the cosine of the sharpest angle.
+    """Return the sum of the normals around u, each twice its triangle's area long, and a cosine.
 
-    by_area  whether areas are summed; otherwise the sum is 0
+    The cosine is that of the sharpest angle of the triangles around u.
+
+    by_area  whether normals are summed; otherwise the sum is 0
     """
     worst, sum_x, sum_y, sum_z = 0.0, 0.0, 0.0, 0.0
     for k in range(ring.sizes[TRIANGLES]):
@@ -38,8 +40,8 @@ def measure_ring(u: int, mesh: Mesh, ring: Ring, by_area: bool) -> tuple[Triple,
 def check_normals(u: int, v: int, mesh: Mesh, ring: Ring, form: tuple[Triple, float]) -> bool:
     """Return whether v may take the place of u in the triangles around u.
 
-    form  sum of the doubled areas around u, by which the turn of slivers is judged (0: no sliver
-          may turn), and the largest allowed cosine of a smallest angle
+    form  sum of the normals around u from `measure_ring`, with which normals of slivers are
+          compared (0: no sliver may turn), and the largest allowed cosine of a smallest angle
     """
     at, planes, ((sum_x, sum_y, sum_z), allowed) = mesh.at, mesh.planes, form
     length = sum_x * sum_x + sum_y * sum_y + sum_z * sum_z

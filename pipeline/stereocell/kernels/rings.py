@@ -30,16 +30,16 @@ class Mesh(NamedTuple):
     on_line: Flags  # bool (n,), vertices on lines of interfaces; (0,) for a surface
     planes: NDArray[np.uint8]  # uint8 (n,), a bit for each cut plane that a vertex lies in
     caps: NDArray[np.uint8]  # uint8 (n,), a bit for each cap; a vertex moves only within its caps
-    errors: Points  # float64 (n,), largest root of the mean squared distance from the planes
+    errors: Points  # float64 (n,), largest allowed root mean square of distances from the planes
 
 
 class Ring(NamedTuple):
-    """The triangles around a vertex and its neighbours. The arrays have space for the most."""
+    """The triangles around a vertex, and its neighbours; the arrays fit the largest ring."""
 
     out: Ints  # the half-edge of each triangle that leaves the vertex
-    first: Ints  # next corner of each triangle
-    second: Ints  # last corner of each triangle
-    near: Ints  # neighbours; in a surface the same as `first`
+    first: Ints  # the corner after the vertex, of each triangle
+    second: Ints  # the corner before the vertex, of each triangle
+    near: Ints  # neighbours; in a surface, this is `first`
     shared: Ints  # interfaces: number of triangles at the edge to each neighbour
     price: Points  # price of moving onto each neighbour
     marks: Ints  # interfaces: marks of neighbours

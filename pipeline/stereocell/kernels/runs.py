@@ -55,7 +55,7 @@ def find_runs(mask: Mask) -> tuple[NDArray[np.int64], Ints, Ints]:
 def join_runs(
     first: NDArray[np.int64], start: Ints, stop: Ints, height: int, by_corners: bool
 ) -> tuple[Ints, Ints, int]:
-    """Return the components of runs.
+    """Return the connected components of a mask, from its runs.
 
     height      number of rows in a plane
     by_corners  whether voxels that share only an edge or a corner are connected, too
@@ -97,7 +97,7 @@ def measure_components(
     count: int,
     shape: tuple[int, int, int],
 ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the boxes, voxels and faces of components.
+    """Return the bounding boxes of components, and their numbers of voxels and of faces.
 
     result  boxes (count, 6), least and largest voxel (z, y, x); numbers of voxels (count,); numbers
             of their faces (count,) towards voxels of the array outside of the component

@@ -16,7 +16,7 @@ def find_downhill(
 
     field    float32 (z, y, x), at least 2 voxels each way
     at       float64 (n, 3), voxels (z, y, x); points beyond the ends are moved to the ends
-    spacing  (z, y, x)
+    spacing  voxel spacing (z, y, x)
 
     Slopes are central differences at voxels, one-sided at the ends, and linear in between.
     """

@@ -144,7 +144,7 @@ def smooth_in_place(
                                after clipping hot voxels; infinite: no limit and no clipping
 
     Voxels at the edges are repeated. Sums are float64, in an order that depends only on the voxel's
-    neighbours. Values between the axes are float32.
+    neighbours. The results along one axis are rounded to float32 before the next axis.
     """
     depth, height, width = field.shape
     rz, rx = len(along_z) // 2, len(along_x) // 2

@@ -9,7 +9,7 @@ from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_tw
 from stereocell.kernels.quadrics import price_of
 from stereocell.kernels.rings import MAX_NEIGHBOURS, NEIGHBOURS, STAMP, TRIANGLES, Flags, Mesh, Ring
 
-VALENCE = 24  # largest number of neighbours of two ends together
+VALENCE = 24  # largest number of neighbours that the two ends of an edge have together
 
 
 @kernel
@@ -48,7 +48,7 @@ def stamp_fan(ring: Ring) -> None:
 
 @step
 def mark_fan(u: int, mesh: Mesh, marks: Flags) -> None:
-    """Mark all neighbours of u, which is not on a border."""
+    """Set the marks of all neighbours of the vertex u, which is not on a border, to True."""
     start = mesh.start[u]
     h = start
     while True:
@@ -60,9 +60,9 @@ def mark_fan(u: int, mesh: Mesh, marks: Flags) -> None:
 
 @step
 def check_fan_link(mesh: Mesh, ring: Ring, chosen: int) -> bool:
-    """Return whether the ends of an edge have two common neighbours, and not too many in all.
+    """Return whether an edge's ends have two common neighbours, and at most VALENCE in all.
 
-    ring    stamped, see `stamp_fan`
+    ring    ring whose neighbours are stamped, see `stamp_fan`
     chosen  number of the edge's far end among the neighbours
     """
     common, others = count_common(ring.out[chosen], mesh.edges, ring.stamp, ring.sizes[STAMP])

@@ -1,4 +1,6 @@
-"""The first paper's alpha wrap of triangles, much slower than that of voxels; for comparison.
+"""Wrap triangles by the alpha wrap of Portaneri et al., for comparison with the wrap of voxels.
+
+The wrap of voxels (isosurface/repair.py) is the default, and much faster.
 
 MeshLab offers the alpha wrap of CGAL. It closes each tile by itself, so its mesh does not meet the
 meshes of neighbours. So it is only for builds of a single tile.

@@ -15,7 +15,7 @@ _VALUES = [field.name for field in fields(Mesh) if field.name not in ("positions
 
 
 def clip_mesh(mesh: Mesh, low: Sequence[float], high: Sequence[float]) -> Mesh:
-    """Return the part of a mesh inside a box. Values at new vertices are interpolated on edges.
+    """Return the part of a mesh inside a box. Values at new vertices are interpolated.
 
     low, high  corners (x, y, z), um; infinite: no cut on that side
     """

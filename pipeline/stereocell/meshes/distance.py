@@ -13,7 +13,7 @@ from stereocell.model.mesh import Mesh, Spread
 # Percent of the area; a sliver with less than 1 % of it may vanish without notice
 PERCENTILE = 99.0
 VERTICES = 50_000  # largest number of vertices that are measured for the largest distance
-# Larger than the number of points that a mesh is ever asked for
+# Mark of triangles that searches leave out; larger than the number of any point that is looked up
 NEVER = np.int32(np.iinfo(np.int32).max)
 # Um; points this close count as on the surface, because positions are rounded to float32
 ON_UM = 1e-6
@@ -82,7 +82,7 @@ def measure_enclosure(source: Nearest, target: Nearest) -> float:
 
 
 def measure_spread(source: Nearest, target: Nearest) -> Spread:
-    """Return the distances in um from one mesh to the other.
+    """Return statistics of the distances, um, from one mesh to the other.
 
     Mean and percentiles are over the source's area. The maximum is also over its vertices, of which
     about VERTICES are measured, spread evenly over their order.

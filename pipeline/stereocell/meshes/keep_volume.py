@@ -40,7 +40,8 @@ from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
 STEPS = 4  # number of Newton steps; volume is a cubic function of the distance
-FADE = 1.25  # distance from a cut, in largest moves, from which vertices move by the whole distance
+# Distance from a cut at which vertices make their whole move, as a multiple of the largest move
+FADE = 1.25
 TRIES = 12  # number of tries with shorter moves, after which a body with defects does not move
 SHORTENING = 0.5  # factor on the moves of vertices in defects, in each try
 MIN_WAY = 0.05  # share of the whole move below which a vertex in a defect does not move
@@ -58,9 +59,9 @@ Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
 
 @dataclass(frozen=True, slots=True)
 class RestoredLevel:
-    """A level whose bodies have their volumes back, as far as possible.
+    """A level of detail whose bodies have their volumes back, as far as possible.
 
-    defects  remaining defects
+    defects  defects that remain in the mesh
     lacks    bool (n,), vertices of bodies whose volume is off by more than MAX_VOLUME_ERROR; all
              False if MANY vertices crossed
     moves    float64 (n, 3), moves of the vertices
@@ -96,8 +97,8 @@ class FineVolumes:
     """The volumes of a fine mesh's bodies, for levels whose vertices are a part of its vertices.
 
     planes    the cut planes
-    box       of the tile; None: vertices may move anywhere
-    topology  of the mesh; None: it is computed
+    box       box of the tile, which vertices do not leave; None: vertices may move anywhere
+    topology  topology of the mesh; None: it is computed
     caps      planes of caps, which stay flat
     """
 
@@ -141,11 +142,11 @@ class FineVolumes:
         topology: Topology | None = None,
         earlier: EarlierLevel | None = None,
     ) -> RestoredLevel:
-        """Return a level with the volumes of the fine bodies.
+        """Return a level of detail whose bodies have the volumes of the fine mesh's bodies.
 
         vertices     int64 (n,), index of each vertex in the fine mesh
         max_move_um  largest distance of a move
-        topology     of the level; None: it is computed
+        topology     topology of the level's mesh; None: it is computed
         earlier      an earlier result, valid for all bodies that have not changed
         """
         planes = self._planes
@@ -169,7 +170,7 @@ class FineVolumes:
             moves[same] = earlier.kept.moves[place]
         placed: Mesh | None = None
         faulty, are_many = np.zeros(0, np.int64), False
-        # After TRIES, at least one more body stops moving each time
+        # The loop ends, because after TRIES tries at least one more body stops moving in each try.
         for number in itertools.count():
             # A vertex that does not move stays bit by bit: a sum would lose the sign of a zero.
             positions = np.where(moves == 0, mesh.positions, (start + moves).astype(np.float32))
@@ -214,7 +215,7 @@ class FineVolumes:
 
         start   float64 (n, 3), positions before the move
         bodies  body of each vertex, and the number of bodies
-        wanted  volumes of the bodies
+        wanted  volumes that the bodies should have, um^3
         share   share of the move that each vertex makes
         """
         label, count = bodies

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import Bounds, require_bounds, setting
 
-MAX_ERROR = 1e6  # in finest spacings; an error of a million spacings leaves only a surface's box
-MAX_SAMPLES = 10_000_000  # number of points; their distances take a gigabyte
+# Largest allowed error, in finest voxel spacings; such an error leaves only a surface's box
+MAX_ERROR = 1e6
+MAX_SAMPLES = 10_000_000  # largest number of points; their distances take a gigabyte
 
 
 @dataclass(frozen=True, slots=True)

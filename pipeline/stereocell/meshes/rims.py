@@ -74,7 +74,7 @@ def _decide(
 ) -> tuple[NDArray[np.void], NDArray[np.void]]:
     """Return the keys of vertices that move, and of those onto which they move, (k,) each.
 
-    axis    of the plane, in (x, y, z)
+    axis    axis that is normal to the plane, 0: x
     value   position of the plane along the axis, um
     planes  uint8 (n,), a bit for each cut plane that a vertex lies in: where two planes meet, a
             triangle must not come to lie in the other plane

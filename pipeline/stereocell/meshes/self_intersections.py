@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from stereocell.kernels.crossings import ERROR_3D, find_candidates, find_maybe_flat, find_spread
 from stereocell.meshes.triangle_grid import find_around, make_grid
 
-# If less than one in FEW triangles is fresh, only the triangles around fresh ones are examined
+# If less than one in FEW triangles is to be checked, only these and the triangles around them are
+# examined
 FEW = 20
 
 Points = NDArray[np.float64]
@@ -85,7 +86,7 @@ def _apart(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
 
 
 def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
-    """Return the exact sign of the volume of a, b, c, d, int32 (n,); points float64 (n, 3).
+    """Return the exact sign of the volume of tetrahedra a b c d, int32 (n,); points float64 (n, 3).
 
     Floats decide if the determinant exceeds its largest error (bound A of Shewchuk's orient3d).
     Exact arithmetic decides the others, which are few: each call of it starts threads.
@@ -106,7 +107,7 @@ def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
 
 
 def orient_2d(a: Points, b: Points, c: Points) -> NDArray[np.int32]:
-    """Return the exact sign of the area of a, b, c, int32 (n,); points float64 (n, 2)."""
+    """Return the exact sign of the area of triangles a b c, int32 (n,); points float64 (n, 2)."""
     # libigl takes points in 3D only. A tetrahedron over the triangle has the same sign.
     a, b, c = (np.pad(x, ((0, 0), (0, 1))) for x in (a, b, c))
     return orient_3d(a, b, c, np.broadcast_to([0.0, 0.0, -1.0], (len(a), 3)))

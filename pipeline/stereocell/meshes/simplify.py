@@ -21,7 +21,7 @@ from stereocell.model.mesh import Mesh
 
 # Largest error that a body may have, as a share of its box's diagonal, and of its shortest side
 OF_DIAGONAL, OF_SIDE = 0.1, 0.2
-STRAY = 3.0  # largest distance of a vertex from the result, in errors
+STRAY = 3.0  # largest distance of a vertex from the result, as a multiple of its largest error
 # Degrees; smallest allowed angle of a triangle, unless triangles around it are sharper already
 SHARPEST_DEG = 12.0
 FLIP_DEG = 25.0  # degrees; edges of triangles with a smaller angle are flipped

@@ -38,7 +38,7 @@ Triangles = NDArray[np.uint32]
 class Simplified:
     """A simplified mesh without defects.
 
-    topology          of the mesh
+    topology          topology of the simplified mesh
     vertices          int64 (k,), index of each vertex in the given mesh, rising
     changed           bool (k,), vertices of bodies that were simplified in this call
     simplified_again  number of bodies that were simplified more than once
@@ -65,7 +65,7 @@ class Simplifier:
 
     mesh      positions float32 (n, 3) in um, triangles uint32 (m, 3)
     planes    the cut planes, where the mesh may be open
-    topology  of the mesh; None: it is computed
+    topology  topology of the mesh; None: it is computed
     caps      planes of caps, which stay flat
 
     Bodies with defects in the given mesh stay as they are.
@@ -86,7 +86,7 @@ class Simplifier:
         self._corners, self._left = mesh.triangles.copy(), np.ones(len(mesh.triangles), bool)
         self._moves = NOTHING
         self._errors = np.zeros(vertices)
-        # Number of locks at each vertex; a vertex with one stays
+        # Number of times that each vertex was locked; a vertex that was locked does not move
         self._tries = np.zeros(vertices, np.int8)
         self._faulty = np.zeros(vertices, bool)  # vertices of the last draft's defects
         self._redone, self._kept = np.zeros((2, self._bodies[1]), bool)
@@ -94,7 +94,7 @@ class Simplifier:
     def simplify(self, max_error_um: float, bodies: NDArray[np.bool_] | None = None) -> Simplified:
         """Return the mesh simplified and without defects. Boundary edges stay.
 
-        max_error_um  see `simplify`
+        max_error_um  largest error of a vertex, um, see `simplify.simplify`
         bodies        bool (b,), the bodies that are simplified; None: all. The others stay as after
                       the last call, unless simplified ones cross them.
         """
@@ -164,7 +164,7 @@ class Simplifier:
     ) -> NDArray[np.bool_]:
         """Simplify the chosen bodies (b,); return which of all triangles have changed (m,).
 
-        but_around_locks  whether earlier moves are repeated except around newly locked vertices
+        repeats_moves  whether earlier moves are repeated, except around newly locked vertices
         """
         part = self._mesh.triangles[chosen[self._body_of]]
         past = self._moves[chosen[self._bodies[0][self._moves[:, 0]]]]

@@ -13,7 +13,8 @@ from stereocell.kernels.half_edges import measure_areas, measure_boxes
 from stereocell.meshes.validity import Topology, find_topology
 from stereocell.model.mesh import Mesh
 
-# In errors; with the default errors, only at lod3 is this more than the size of kept fragments
+# Diagonal of a body's box below which it is small, as a multiple of the level's error. With the
+# default errors, only at lod3 is this more than the size of the smallest fragments of a surface.
 SMALL = 4.0
 MAX_AREA_SHARE = 0.02  # largest share of the surface's area in bodies that are removed
 
@@ -34,7 +35,7 @@ class SmallBodies:
     def find(self, error_um: float) -> NDArray[np.bool_]:
         """Return which vertices of the surface belong to removed bodies, bool (n,).
 
-        error_um  error of the level
+        error_um  largest error of the level of detail
         """
         small = (self._diagonals < SMALL * error_um) & (self._areas > 0) & ~self._is_open
         order = np.flatnonzero(small)

@@ -10,7 +10,7 @@ from stereocell.kernels.grid import bound_all, bound_boxes, count_entries, find_
 Points = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-EDGE = 1.5  # edge of a cell, in median sides of a triangle
+EDGE = 1.5  # edge of a cell, as a multiple of the median side of the triangles
 # Largest average number of cells per triangle; large triangles lie in many small cells
 ENTRIES = 12
 CELLS = 16  # largest number of cells per triangle; a mesh fills only a small part of its box

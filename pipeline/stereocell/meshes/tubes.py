@@ -47,7 +47,7 @@ def _sweep(
     steps = np.diff(points, axis=0)
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)
     along = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
-    # The line turns back here, so it keeps its direction
+    # Where the line turns back, the tube takes the direction of the next segment.
     short = np.linalg.norm(along, axis=1) < 1e-9
     along[short] = np.concatenate([steps, steps[-1:]])[short]
     along /= np.linalg.norm(along, axis=1, keepdims=True)

@@ -119,7 +119,7 @@ def find_defects(
     mesh      positions float32 (n, 3), triangles uint32 (m, 3)
     planes    the cut planes: axis (0 x, 1 y, 2 z) and value in um
     fresh     bool (m,); only pairs with such a triangle are checked for crossings; None: all pairs
-    topology  of the triangles, for meshes that differ only in positions; None: it is computed
+    topology  topology of the triangles, known from a mesh with other positions; None: not known
 
     A body's winding is the sign of the volume that it encloses together with the planes that cut
     it. A body of negative volume is a cavity if it lies in the box of a solid.

@@ -44,7 +44,7 @@ class ArraySource:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """The shape as (c, z, y, x)."""
+        """The array's shape as (c, z, y, x), with one channel for an array (z, y, x)."""
         shape = tuple(int(n) for n in self.data.shape)
         return (1, *shape) if len(shape) == 3 else shape  # type: ignore[return-value]
 
@@ -235,7 +235,10 @@ def _mean(part: NDArray[Any], blocks: tuple[int, int, int]) -> NDArray[Any]:
 
 
 def _as_stored(voxels: NDArray[Any]) -> NDArray[Any]:
-    """Convert voxels to a type that OME-TIFF can store and a build can read. Raises UsageError."""
+    """Convert voxels to a type that OME-TIFF can store and a build can read.
+
+    Raises UsageError if no value is finite.
+    """
     if voxels.dtype.kind == "b":
         return voxels.astype(np.uint8)
     if voxels.dtype.kind == "f":

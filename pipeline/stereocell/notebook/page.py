@@ -14,7 +14,7 @@ _FRAME = Path(__file__).with_name("frame.js")
 
 
 def document() -> str:
-    """Return the frame's document."""
+    """Return the HTML document for the frame in a notebook."""
     return blob_page.document(_FRAME)
 
 

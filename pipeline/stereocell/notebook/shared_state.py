@@ -13,9 +13,11 @@ _PICKED = ("tile", "channel", "object")
 
 
 def check_link(link: str) -> str:
-    """Return the part of a link from `#` on. Raises UsageError.
+    """Return the part of a link from `#` on; empty for an empty link.
 
-    link  a whole link, or this part alone
+    link  a whole link, or its part from `#` on
+
+    Raises UsageError if it is no link to a view, or longer than the viewer reads.
     """
     start, mark, view = link.partition("#")
     if (start and not mark) or (mark and not view.startswith("v=")):
@@ -72,7 +74,10 @@ def _check_appearance(id_: str, appearance: Any) -> dict[str, Any]:
 
 
 def check_view(view: Mapping[str, Any]) -> dict[str, list[float]]:
-    """Return the eye and target of a camera, as far as given. Raises UsageError."""
+    """Return the camera's `eye_um` and `target_um`, as far as given, as lists of floats.
+
+    Raises UsageError for other names, for values that are not x, y, z, and for equal points.
+    """
     for name in view:
         if name not in ("eye_um", "target_um"):
             raise UsageError(f"view: {name!r:.40} is unknown, expected eye_um and target_um")
@@ -83,7 +88,10 @@ def check_view(view: Mapping[str, Any]) -> dict[str, list[float]]:
 
 
 def check_picked(picked: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """Return a picked point, with its tile, channel and object if given. Raises UsageError."""
+    """Return a picked point, with its tile, channel and object if given; None: no point.
+
+    Raises UsageError without `point_um`, for other names, and for values of the wrong type.
+    """
     if picked is None:
         return None
     where = f"picked is {dict(picked)!r:.80}, expected {{'point_um': (x, y, z)}}"

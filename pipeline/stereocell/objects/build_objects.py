@@ -36,7 +36,7 @@ class BuiltObjects:
     volumes_um3    float64 (n,), volumes of their voxels
     areas_um2      float64 (n,), areas of their surfaces at the finest level
     largest_bias   for each level, the largest relative error of an object's volume
-    stopped        levels at which simplification stopped early
+    stopped        numbers of the levels of detail at which simplification stopped early
     interfaces     int32 (m, 2): an object's index, and the label of another object that it touches
     interface_um2  float64 (m,), area of that interface
     changed        number of voxels that were changed so that no object touches itself by an edge
@@ -68,9 +68,9 @@ def build_objects(
 
     labels     int32 (z, y, x), 0 outside; objects are closed at the array's ends
     owned      int32 (n,), rising: objects that are built, each completely within the array
-    spacing_um, origin_um  (z, y, x), of the voxels, and of the centre of the first one
+    spacing_um, origin_um  voxel spacing, and centre of the first voxel, (z, y, x)
     step_um    step of the lattice on which vertices lie
-    clock      measures the time of each part
+    clock      measures the time of each part of the work
 
     Objects that are too thin are left out, see objects/well_composed.py.
     """

@@ -60,7 +60,7 @@ class Extents:
 
 
 def find_extents(labels: NDArray[np.integer], start: tuple[int, int, int]) -> Extents:
-    """Return the extents of a block's objects.
+    """Return voxels, boxes and centres of the objects in a block of a label map.
 
     labels  (z, y, x), integers of at least 0
     start   index of the block's first voxel in the label map; results are indices in the label map

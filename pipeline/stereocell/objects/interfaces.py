@@ -31,7 +31,7 @@ from stereocell.model.volume import zyx_to_xyz
 # would round boxes into pillows.
 SMOOTHINGS = 70
 _INWARD, _OUTWARD = 0.64, -0.65  # shares of the way to the mean of the neighbours, alternately
-_ROUNDS = 12  # largest number of rounds in which vertices are put back
+_ROUNDS = 12  # largest number of rounds in which vertices are put back to their cubes' centres
 _REACH = 0.5  # voxels; largest distance of a vertex from its cube's centre, along each axis
 
 

@@ -24,7 +24,7 @@ MIN_BY_AXIS = 0.5  # least share of equal pairs along each axis
 MIN_VOXELS = 20.0  # least mean number of voxels of a component
 MAX_PIECES = 1.2  # largest number of components per value, in a map of whole objects
 MIN_OBJECTS = 8  # number of values from which whole objects are sufficient evidence
-# Share of the unequal pairs that differ by 1, in a smooth image of more than MANY_LEVELS values
+# Least share of the unequal pairs that differ by 1, in a smooth image of over MANY_LEVELS values
 ONE_OFF = 0.5
 MANY_LEVELS = 32
 _NO_LABELS = 0.5  # share of equal pairs below which components are not examined
@@ -32,11 +32,11 @@ _NO_LABELS = 0.5  # share of equal pairs below which components are not examined
 
 @dataclass(frozen=True, slots=True)
 class LabelEvidence:
-    """The evidence in an array on whether it holds labels.
+    """The evidence on whether an array holds labels of objects.
 
     kind    mask: the array has only two values
-    values  number of values without 0
-    pieces  number of connected components outside of the ground
+    values  number of different values, without 0
+    pieces  number of connected components of equal voxels, without 0 and an image's even ground
     """
 
     kind: Kind
@@ -45,7 +45,7 @@ class LabelEvidence:
 
 
 def recognise(voxels: NDArray[Any]) -> LabelEvidence:
-    """Return the kind of an array.
+    """Return whether an array is an image, a mask or a label map, and the evidence.
 
     voxels  (z, y, x), any number type; a part of the data is sufficient
 

@@ -48,7 +48,7 @@ def simplify_interfaces(
     max_error_um  largest root of the mean squared distance of a vertex from the planes of the
                   triangles that it represents; less at small objects, by their boxes
     volumes_um3   float64 (objects + 1,), volume that each object should have; NaN: any
-    step_um       step of the lattice
+    step_um       step of the lattice on which vertices lie
     locked        bool (n,), vertices that stay; None: all are free
     """
     if not len(interfaces.triangles):
@@ -99,7 +99,7 @@ def keep_volumes(
     The second result is whether that was completed. If not, the interfaces are returned as given.
 
     fixed        bool (n,), vertices that stay
-    most_um      largest move of a vertex
+    most_um      largest move of a vertex, um
     volumes_um3  float64 (objects + 1,), volume that each object should have
 
     Vertices move along the gradients of the volumes. The sum of squared moves, weighted by the area
@@ -109,7 +109,7 @@ def keep_volumes(
     positions, past = interfaces.positions, interfaces.positions
     at_fault = np.zeros(0, np.int64)
     for turn in range(_ROUNDS):
-        if turn < _SEARCHES:  # since fixed vertices make the others move farther
+        if turn < _SEARCHES:  # newly fixed vertices make the others move farther
             moved = _moved(interfaces, positions, volumes_um3, fixed, most_um)
             positions = put_on_lattice(moved, step_um)
         fresh = (positions != past).any(axis=1)

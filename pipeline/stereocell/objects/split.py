@@ -9,7 +9,7 @@ from stereocell.model.mesh import Mesh
 
 
 def split_objects(mesh: Mesh) -> Iterator[tuple[int, Mesh]]:
-    """Yield each object's number, rising, and its part of the mesh."""
+    """Yield the number of each object, rising, and a mesh of its triangles alone."""
     assert mesh.objects is not None
     order = np.argsort(mesh.objects, kind="stable")
     rank = np.empty(len(order), np.int64)

@@ -186,6 +186,6 @@ def color_objects(table: ObjectTable) -> NDArray[np.float32]:
         hashed = hashed_colors(table.labels)
         own = hashed if table.colors is None else table.colors
         return np.where(np.isnan(own), hashed, own)
-    # Missing values are -1, the last row
+    # A missing value is -1, which is the index of the palette's last row.
     palette = np.array([*column.colors, NO_CATEGORY], np.float32)
     return palette[column.values.astype(np.int64)]

@@ -41,7 +41,7 @@ def make_well_composed(
     """
     labels = np.ascontiguousarray(labels)
     thin = np.zeros(0, np.int32)
-    while True:  # each time without the objects found too thin
+    while True:  # each turn leaves out the objects that were too thin in the turn before
         mended, found = _mend(labels)
         if not len(found):
             return mended, int((mended != labels).sum()), thin
@@ -67,17 +67,18 @@ def _mend(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int3
                 flat[voxel] = label
                 touched.add(voxel)
                 changed.add(voxel)
-        thin = _find_thin(labels, mended)  # in each round, since noise takes many rounds
+        # Thin objects are looked for in each round, since a noisy label map takes many rounds.
+        thin = _find_thin(labels, mended)
         if len(thin):
             return mended, thin
-    # Pinches remain after the last round
+    # Objects that still have pinches after the last round count as too thin.
     return mended, np.unique(flat[places[:, 0]]).astype(np.int32)
 
 
 def _best_change(
     flat: NDArray[np.int32], place: Sequence[int], around: NDArray[np.int64], changed: set[int]
 ) -> tuple[int, int]:
-    """Return the voxel to change, and its new label."""
+    """Return the voxel to change at a place from `find_critical`, and its new label."""
     own, others = dict.fromkeys(place[:2]), [voxel for voxel in place[2:] if voxel >= 0]
     label = int(flat[place[0]])
     changes = [(voxel, label) for voxel in others]

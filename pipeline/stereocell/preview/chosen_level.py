@@ -45,7 +45,7 @@ def choose_level(
 ) -> Chosen:
     """Return the iso-value that a build would use if all tiles were like this one.
 
-    tiles  the tiles in which `found` was found
+    tiles  the tiles whose voxels gave the candidates in `found`
     field  float32 (z, y, x), denoised voxels of `tile`; minus the background if `found` subtracts
     """
     if not found.candidates:

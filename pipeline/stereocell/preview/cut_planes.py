@@ -29,7 +29,7 @@ _UNSEEN = 0.5  # pixels by which a picture may be too long before it is resample
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """Pictures across one axis.
+    """Pictures of slices across one axis of a volume.
 
     view       direction and orientation of the pictures
     shape      pixels (rows, columns) of a picture
@@ -132,7 +132,7 @@ def square_pixels(
 
 
 def extent_words(cut: Cut, *, is_patient: bool) -> dict[str, str]:
-    """Return the directions in which `slices`, `rows` and `columns` run: axes or sides."""
+    """Return the directions of `slices`, `rows` and `columns`: axes, or sides of the patient."""
     if not is_patient:
         slices, rows, columns = ("zyx"[axis] for axis in cut.view.order)
         return {"slices": slices, "rows": rows, "columns": columns}

@@ -26,8 +26,8 @@ from stereocell.model.volume import Volume, zyx_to_xyz
 from stereocell.preview.views import MICROSCOPE, View
 
 Color = tuple[int, int, int]
-OUTLINE = (255, 190, 40)  # sRGB, 0..255
-FIELD = (70, 190, 255)
+OUTLINE = (255, 190, 40)  # sRGB, 0..255, of the line around the mesh
+FIELD = (70, 190, 255)  # sRGB, 0..255, of the field's contour at the iso-value
 _GROUND = (38, 43, 51)
 _LONGEST_PX = 300  # pixels, longest side of a slice
 _GAP_PX = 6  # pixels between slices
@@ -228,7 +228,8 @@ def _zero_line(
     if is_dashed:
         dash = round(_DASH_PX * _FINE * weight)
         is_drawn = np.arange(fine[0] + fine[1]) // dash % 2 == 0
-        edge &= sliding_window_view(is_drawn, fine[0])[: fine[1]]  # along the diagonals
+        # Dashes and gaps alternate along the diagonals of the picture.
+        edge &= sliding_window_view(is_drawn, fine[0])[: fine[1]]
     return _averaged(edge, weight)
 
 
@@ -283,7 +284,12 @@ def _write_ends(
     size: tuple[int, int],
     weight: float,
 ) -> None:
-    """Write the letters in the middle of each edge of a panel; `size` is (columns, rows)."""
+    """Write a letter in the middle of each edge of a slice: left, right, top, bottom.
+
+    ends    the letters, in this order
+    corner  upper left corner of the slice in the picture, pixels (x, y)
+    size    (columns, rows) of the slice, pixels
+    """
     (x, y), (width, height), gap = corner, size, round(3 * weight)
     places = (
         ((x + gap, y + height / 2), "lm"),

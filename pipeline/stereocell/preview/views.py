@@ -17,7 +17,7 @@ from stereocell.model.rigid_transform import IDENTITY, Matrix
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One view of a volume.
+    """The orientation of slices across one axis of a volume.
 
     order  indices of axes (of z, y, x): the one that is cut, the rows' and the columns'
     flips  whether rows and columns run against their axes

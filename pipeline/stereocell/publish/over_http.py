@@ -26,7 +26,7 @@ def fetch_faults(
     """Return the fault of each file that a host sends wrongly, by path; empty if all are right.
 
     address  address of the folder, with a slash at its end
-    entries  path -> bytes and sha256
+    entries  path -> entry with size (`bytes`) and hash (`sha256`)
     """
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         found = pool.map(lambda path: _fault(address, path, entries[path]), entries)
@@ -36,7 +36,7 @@ def fetch_faults(
 
 
 def find_page(address: str, entries: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the address of the page.
+    """Return the address at which a host serves the published page.
 
     This is the folder's address, or its index.html for a host that sends no page for a folder, such
     as S3.

@@ -43,7 +43,7 @@ _SMALL_BYTES = 1000  # bytes; smaller JSON files are not compressed
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """The result of a run.
+    """The result of publishing a bundle once.
 
     address                   the page's address for browsers; None if it is not known
     files, bytes              all files of the bundle, and their size
@@ -63,7 +63,7 @@ class Published:
 class _File:
     """A file of the bundle, or a compressed copy of one.
 
-    entry  bytes and sha256
+    entry  size (`bytes`) and hash (`sha256`) of the content
     """
 
     entry: Mapping[str, Any]
@@ -74,7 +74,7 @@ class _File:
 class _Work:
     """The changes that a run makes at a target.
 
-    there    path -> bytes of each file at the target
+    there    path -> size in bytes, of each file at the target
     before   the entries of the files that an earlier run has uploaded
     changed  paths to upload
     gone     published paths that the bundle no longer has
@@ -140,7 +140,7 @@ def publish(
 
 
 def _compare(target: Target, entries: Entries, specimen: Mapping[str, str]) -> _Work:
-    """Return the changes that are needed at a target.
+    """Compare a target with the bundle, and return the changes that are needed there.
 
     Raises OutputError if the target holds somebody else's files, or files that somebody edited.
     """

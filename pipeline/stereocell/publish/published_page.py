@@ -17,7 +17,8 @@ from stereocell.storage.contents import PUBLISHED, words_for
 from stereocell.storage.file_list import to_json
 from stereocell.storage.overwriting import is_forced, or_force, refused
 
-# path -> bytes and sha256; None if a run was stopped that may or may not have uploaded the file
+# path -> entry with size (`bytes`) and hash (`sha256`); the entry is None if a run was stopped that
+# may or may not have uploaded the file
 Entries = Mapping[str, Any]
 _OF_HOSTS = ("CNAME", "README.md", "LICENSE", "robots.txt", "404.html")
 CHANGED = "changed since it was published"
@@ -76,7 +77,7 @@ def require_own(
     Files for the host, such as CNAME, may lie in a new target.
 
     entries   the files of the bundle
-    there     path -> bytes of each file at the target
+    there     path -> size in bytes, of each file at the target
     before    the entries of the files that an earlier run has uploaded
     specimen  name and fingerprint of the bundle's specimen
     """

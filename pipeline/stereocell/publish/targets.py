@@ -32,7 +32,7 @@ class Target(Protocol):
         """The address at which browsers find the files, ending in a slash; None if unknown."""
 
     def sizes(self) -> dict[str, int]:
-        """Return path -> bytes of all files at the target, including files of others."""
+        """Return the size in bytes of each file at the target, by path, also of files of others."""
 
     def read(self, path: str) -> bytes:
         """Return a file's content."""
@@ -73,7 +73,7 @@ class FolderTarget:
         self.shown = str(folder)
 
     def sizes(self) -> dict[str, int]:
-        """Return path -> bytes of all files below the folder, except git's."""
+        """Return the size in bytes of each file below the folder, by path, except git's."""
         if self.folder.exists() and not self.folder.is_dir():
             raise OutputError(f"{self.folder}: found a file, expected a folder")
         return {
@@ -123,7 +123,7 @@ class StoreTarget:
 
     @cached_property
     def _storage(self) -> tuple[Any, str]:
-        """fsspec's file system, and the target's path in it."""
+        """The file system of fsspec that the target is in, and the target's path in it."""
         import fsspec
 
         with self._in_one_line(""):
@@ -165,7 +165,7 @@ class StoreTarget:
         )
 
     def sizes(self) -> dict[str, int]:
-        """Return path -> bytes of all objects below the address."""
+        """Return the size in bytes of each object below the address, by path."""
         fs, base = self._storage
         with self._in_one_line(""):
             try:

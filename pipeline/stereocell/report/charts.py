@@ -17,7 +17,7 @@ def histogram(
 ) -> Markup:
     """Return a chart of a channel's histogram over its window, with opacities and iso-value.
 
-    counts          of equal bins over the window; drawn logarithmically
+    counts          number of voxels in equal bins over the window; drawn logarithmically
     functions       opacity points of each transfer function; 0 is at the bottom, 1 at the top
     iso_normalized  0..1 in the window; None: no line
 
@@ -39,7 +39,7 @@ def histogram(
 def candidates(
     heights: Sequence[float], *, taken: Sequence[float], others: Sequence[float]
 ) -> Markup:
-    """Return a chart of the histogram on which iso-values are found, with vertical lines at them.
+    """Return a chart of the histogram from which iso-values are found, with a line at each of them.
 
     heights        0..1, evenly spaced along the axis
     taken, others  positions on the axis, 0..1: the surface's iso-value, and the others found
@@ -60,7 +60,7 @@ def threshold(
 ) -> Markup:
     """Return a chart of a histogram and its moving mean, with vertical lines at thresholds.
 
-    counts, smoothed  of equal bins along the axis, (n,)
+    counts, smoothed  number of voxels in equal bins along the axis, and its moving mean, (n,)
     top               count at the top of the chart, where larger counts are cut off
     peaks             positions of peaks on the axis, 0..1; short ticks at the top mark them
     rules             CSS class of each line: its position on the axis, 0..1

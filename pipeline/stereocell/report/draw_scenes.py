@@ -22,8 +22,8 @@ class Surface:
 class Scene:
     """The content of one picture. A box is its smallest and largest corner (x, y, z), world um.
 
-    boxes  boxes drawn as outlines
-    frame  box that fills the picture
+    boxes  boxes that are drawn as outlines, such as those of tiles
+    frame  box whose projection fills the picture
     size   width and largest height of the picture, pixels
     """
 
@@ -43,7 +43,7 @@ class Picture:
 
 
 def draw_scene(scene: Scene) -> Picture:
-    """Return a picture of the scene."""
+    """Draw a scene of meshes and boxes; return the picture."""
     shapes = map(_load, scene.surfaces)
     image = Image.fromarray(draw_pixels(shapes, scene.frame, scene.size, boxes=scene.boxes))
     return Picture(encode(image), *image.size)

@@ -30,9 +30,9 @@ class LodFacts:
 
     distance_um  99th percentile of the distance between mesh and iso-surface
     bytes        size of the .glb in the bundle, or else of the unit's own file
-    mean_um, p95_um, max_um  the same distance: mean, 95th percentile, largest
-    faults       defects that the exact check found
-    fallbacks    components left as in the finer level, because simplifying made defects
+    mean_um, p95_um, max_um  mean, 95th percentile and maximum of this distance
+    faults       number of defects that the exact check of the mesh found
+    fallbacks    number of components left as in the finer level, since simplifying made defects
     angle_deg    1st percentile of the triangles' smallest angles
     enclosed     share of the finest surface inside this level or on it, 0..1
 
@@ -53,14 +53,14 @@ class LodFacts:
 
 @dataclass(frozen=True, slots=True)
 class UnitFacts:
-    """One finished (tile, channel).
+    """The numbers of one finished unit, which is a channel in a tile.
 
-    directory   folder of its results
+    directory   folder of the unit's results
     iso_value   voxel value above the background; None: the channel has none
     background  mean of the subtracted background over the tile, voxel values; 0: none
-    confidence  0..1, of this tile alone; None: the tile holds no structure
+    confidence  0..1, of the iso-value in this tile alone; None: the tile holds no structure
     reason      why there is no surface; empty: there is one
-    voxels      (x, y, z), size of the stored volume with its apron
+    voxels      size (x, y, z) of the stored volume with its apron, in voxels
     volume_bytes, ktx2_bytes  size of the 8-bit voxels, and of their files in the bundle (0: none)
     cover       how the surface covers the source's voxels; None: the channel has no iso-value
     lifted      number of voxels that only noise lifts above the iso-value; None: unknown
@@ -91,13 +91,13 @@ class UnitFacts:
 
     @property
     def slowest_step(self) -> str:
-        """The step that took longest; empty where no times are recorded."""
+        """The build step that took longest; empty where no times are recorded."""
         return max(self.seconds, key=lambda step: self.seconds[step], default="")
 
 
 @dataclass(frozen=True, slots=True)
 class StepFacts:
-    """Seconds of one step over all units; `slowest` is the unit that took `largest`."""
+    """Seconds of one build step, over all units; `slowest` is the unit that took `largest`."""
 
     name: str
     median: float
@@ -108,7 +108,7 @@ class StepFacts:
 
 @dataclass(frozen=True, slots=True)
 class FileFacts:
-    """Files of one kind in one part of OUT."""
+    """Number and size of the files with one suffix in units, stage or bundle."""
 
     part: str
     suffix: str
@@ -227,7 +227,7 @@ def _lod(record: dict[str, Any], size: int) -> LodFacts:
 
 
 def sum_up(units: Iterable[UnitFacts]) -> Total:
-    """Return the sums over these units."""
+    """Return the sums over some units, by level of detail."""
     units = list(units)
     levels = max((len(unit.lods) for unit in units), default=0)
     lods = []
@@ -272,7 +272,7 @@ class _Spent:
 
 
 def _steps(units: Sequence[UnitFacts]) -> tuple[StepFacts, ...]:
-    """Return the times of the steps, in the order in which units run them."""
+    """Return the times of the build steps, in the order in which units run them."""
     spent: dict[str, _Spent] = defaultdict(_Spent)
     for unit in sorted(units, key=lambda unit: -len(unit.seconds)):  # most steps first
         for step, seconds in unit.seconds.items():

@@ -13,9 +13,9 @@ from stereocell.steps.unit_files import load_objects, load_record
 class ObjectLevel:
     """One level of detail of all objects of a label map.
 
-    distance_um, farthest_um  distance from the faces between voxels, 99th percentile and largest
+    distance_um, farthest_um  distance from the faces between voxels, um: 99th percentile, largest
     bias   largest relative error of an object's volume, compared with its voxels
-    bytes  size of the .glb files in the bundle
+    bytes  size of this level's .glb files in the bundle
     """
 
     triangles: int
@@ -27,14 +27,14 @@ class ObjectLevel:
 
 @dataclass(frozen=True, slots=True)
 class LabelFacts:
-    """One label map.
+    """The numbers of one label map.
 
     color    linear RGB, 0..1
     objects  number of objects
     pieces   number of further pieces, into which the planes between tiles cut objects
     changed  voxels that were changed, so that no object touches itself at an edge or a corner
     stopped  notes on objects whose simplification stopped early
-    units    folders of its units that have a surface
+    units    folders of the label map's units that have a surface
     """
 
     name: str

@@ -29,9 +29,9 @@ def find_opening(
     labels: tuple[LabelFacts, ...],
     with_others: Collection[str],
 ) -> Opening:
-    """Return the opening of a build's report.
+    """Return the three sentences that open a build's report.
 
-    covers       by the name of each channel with a surface
+    covers       how surfaces cover the source's voxels, by the name of each channel with one
     with_others  names of the channels for which the page shows other iso-values
     """
     look_first, anchor = _look_first(facts, covers, with_others)

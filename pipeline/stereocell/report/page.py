@@ -48,7 +48,8 @@ from stereocell.textures.unwrap import mip_levels_apart
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
 MAX_PICTURED = 60  # largest number of units with pictures
 MAX_ROWS = 400  # largest number of units in a table
-_TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # largest number drawn in one picture
+# Largest number of triangles in one picture, of a tile and of the whole specimen
+_TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000
 # pixels: width and largest height of a picture
 _TILE_PX, _WHOLE_PX = (420, 420), (1120, 620)
 
@@ -65,9 +66,9 @@ def write_report(out: Path) -> None:
 
 
 def render(out_folder: OutFolder, facts: Facts) -> str:
-    """Return the page as HTML."""
+    """Return the report as one HTML page."""
     plan = facts.plan
-    tissue = find_tissue(out_folder.out, plan)  # first, since damaged files raise an error here
+    tissue = find_tissue(out_folder.out, plan)  # read first, since damaged files raise an error
     chosen = choose_units(len(plan.tiles), len(plan.channels), MAX_PICTURED)
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
@@ -328,7 +329,10 @@ def _in_eight_bits(
 
 
 def _scene(facts: Facts, tile: Tile | None, labels: Sequence[LabelFacts] = ()) -> Scene:
-    """Return the scene of a tile, or of the whole specimen: label maps where there is no image."""
+    """Return the scene of a tile, or of the whole specimen if `tile` is None.
+
+    labels  label maps, which are drawn only if the plan has no image channels
+    """
     tiles = facts.plan.tiles if tile is None else (tile,)
     most = _WHOLE_TRIANGLES if tile is None else _TILE_TRIANGLES
     units = [u for u in facts.units if u.lods and (tile is None or u.tile == tile)]
@@ -367,7 +371,7 @@ def _drawn_note(units: Sequence[UnitFacts], most: int) -> str:
 
 
 def _box_um(facts: Facts, tile: Tile) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the box that a tile's mesh fills, by two corners (x, y, z) in world um."""
+    """Return the bounding box of a tile's mesh as two corners (x, y, z), world um."""
     lattice = tile.lattice(facts.plan.region)
     ends = [lattice.start, [end - 1 for end in lattice.stop]]
     corners = zyx_to_xyz([facts.plan.position_um(end) for end in ends])

@@ -22,7 +22,7 @@ class Remark:
 
 
 def find_remarks(facts: Facts) -> list[Remark]:
-    """Return the remarks, most severe first."""
+    """Return the report's remarks about a build, most severe first."""
     units, covers = facts.units, find_covers(facts.units)
     looks = {channel.name: facts.survey[channel.id].appearance for channel in facts.plan.channels}
     with_surface = {u.channel.name for u in units if not u.reason}

@@ -34,7 +34,11 @@ class LevelMaps:
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """The similarity of a level of detail to lod0: SSIM, -1..1, of each view and close up."""
+    """The similarity of a level of detail to lod0, as SSIM, -1..1, of pictures of both.
+
+    views  one value for each direction in `texture_similarity.VIEWS`
+    close  value of one close picture from the front
+    """
 
     unit: str
     level: int
@@ -43,7 +47,7 @@ class Likeness:
 
     @property
     def mean(self) -> float:
-        """The mean SSIM of the views."""
+        """The mean SSIM over the directions, without the close picture."""
         return sum(self.views) / len(self.views)
 
 
@@ -76,7 +80,7 @@ def _level(maps: Sequence[dict[str, Any]], level: int) -> LevelMaps:
 
 
 def compare(facts: Facts) -> list[Likeness]:
-    """Return the similarity of some units with several levels, evenly chosen."""
+    """Return how similar a coarser level is to lod0, for a few evenly chosen units."""
     units = [unit for unit in facts.units if len(unit.lods) > 1]
     found = []
     every = max(1, -(-len(units) // MAX_COMPARED))

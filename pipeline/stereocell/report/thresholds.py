@@ -30,17 +30,17 @@ READINGS = {  # Threshold.reading: sentence; its format arguments are Threshold.
     "and the next one, at {1:.5g}",
     "single peak": "at the foot of the longer side of the only peak, which is at {0:.5g}",
 }
-MAX_NAMED = 6  # largest number of listed rises that may be due to chance
+MAX_NAMED = 6  # largest number of listed peaks that may be due to chance
 _ROOM = 1.6  # top of the chart, as a multiple of the second-highest peak; air is often higher
 _LI_VOXELS = 200_000  # approximate number of voxels that represent the counts in Li's method
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One threshold.
+    """One threshold in the figure: the adaptive one, or that of another method.
 
-    kind   CSS class of its line
-    value  voxel value
+    kind   CSS class of the threshold's line in the chart
+    value  the threshold as a voxel value
     above  share of the voxels above it, 0..1
     """
 

@@ -1,4 +1,4 @@
-"""The report's picture of tissue classes: three planes, coloured by probability."""
+"""The report's picture of tissue classes: three slices, coloured by probability."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from stereocell.preview.views import views_of
 from stereocell.steps.open_source import open_source
 from stereocell.steps.tissue_files import FOLDER, read_record
 
-SHOWN_PX = 330  # pixels, longest edge of a plane
-_GAP_PX = 6  # pixels between planes
+SHOWN_PX = 330  # pixels, longest edge of a slice
+_GAP_PX = 6  # pixels between slices
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
 
 
 def _middle(read: Callable[[Box], NDArray[np.float32]], region: Box) -> list[int]:
-    """Return the voxel (z, y, x) at the centre of all classes, estimated from evenly spaced planes.
+    """Return the voxel (z, y, x) at the centre of all classes, estimated from evenly spaced slices.
 
     read  returns the probabilities 0..1 of a box, float32 (class, z, y, x)
     """
@@ -85,7 +85,7 @@ def _plane(region: Box, axis: int, at: int) -> Box:
 
 
 def _paint(panels: list[tuple[Image.Image, list[float]]]) -> tuple[bytes, int, int]:
-    """Return the planes side by side at one scale: WebP data, width and height in pixels."""
+    """Return the slices side by side at one scale: WebP data, width and height in pixels."""
     scale = SHOWN_PX / max(max(extent) for _, extent in panels)
     sizes = [tuple(max(2, round(um * scale)) for um in extent) for _, extent in panels]
     width = sum(right for _, right in sizes) + _GAP_PX * (len(sizes) - 1)

@@ -17,7 +17,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Nucleus:
-    """An ellipsoid.
+    """The nucleus of a cell: an ellipsoid, with a ball around it as the cell's body.
 
     center_um     (z, y, x)
     semi_axes_um  along the columns of `rotation`, a (3, 3) rotation of (z, y, x)

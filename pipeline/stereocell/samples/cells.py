@@ -62,7 +62,7 @@ _LLOYD = 4  # rounds of Lloyd's algorithm
 
 @dataclass(frozen=True, slots=True)
 class CellTissue:
-    """The ground truth of n cells.
+    """The ground truth of the sample: positions, types and marker levels of n cells.
 
     labels   uint32 (z, y, x), 1 to n; 0 between cells
     centres  float64 (n, 3), um, (z, y, x)

@@ -39,10 +39,10 @@ WHITE_LEVEL = 1000.0  # voxel value of white matter, without bias
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """An ellipsoid.
+    """A part of the head phantom, which is an ellipsoid.
 
     label      class of the tissue, BACKGROUND to OTHER
-    signal     as a share of white matter's signal
+    signal     signal of the tissue, as a share of white matter's
     center     mm from the middle of the field of view (z, y, x): to the front, down, to the
                patient's left
     semi_axes  mm (z, y, x)

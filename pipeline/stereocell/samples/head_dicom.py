@@ -122,7 +122,7 @@ def _turn(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
 
 
 def _files(head: HeadPhantom, seed: int) -> dict[str, bytes]:
-    """Return the contents of the files by name."""
+    """Return the contents of the DICOM files, one for each slice, by file name."""
     affine = affine_of(head)
     # Slices are stored as (slice, row, column), which run to the left, down and to the back.
     stored = head.voxels[::-1].transpose(2, 1, 0)

@@ -20,7 +20,7 @@ from stereocell.model.volume import xyz_to_zyx
 
 DIRECTIONS = 48  # number of rays over the whole sphere; half of them rise above a surface
 STEP = 0.75  # step along a ray, in coarsest voxel spacings
-NEIGHBOURS = 4  # number of points with values whose mean other points take
+NEIGHBOURS = 4  # number of nearest known values whose weighted mean a point takes
 
 
 def find_ambient_visibility(
@@ -42,7 +42,6 @@ def find_ambient_visibility(
 
     A direction's weight is its cosine to the normal. Rays start a STEP above the surface, so that
     its own voxels do not hide it.
-    its own voxels don't hide it.
     """
     points = mesh.positions
     if radius_um <= 0 or not len(points):
@@ -55,10 +54,10 @@ def find_ambient_visibility(
 
 
 def thin_out(points: NDArray[np.float32], edge_um: float) -> NDArray[np.int64]:
-    """Return the index of the first point in each occupied block of space, int64 (k,), rising.
+    """Return the index of the first point in each occupied cube of space, int64 (k,), rising.
 
     points   float32 (n, 3), um
-    edge_um  edge length of a block; all blocks lie on one grid in world space
+    edge_um  edge length of a cube; all cubes lie on one grid in world space
     """
     blocks = np.floor(points / edge_um).astype(np.int64)
     blocks -= blocks.min(axis=0)
@@ -70,7 +69,7 @@ def thin_out(points: NDArray[np.float32], edge_um: float) -> NDArray[np.int64]:
 def spread(
     known: NDArray[np.float32], values: NDArray[np.float32], points: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Return values at the points, float32 (n,): means of the nearest known ones, near ones more.
+    """Return values at points, float32 (n,): means of near known values, weighted by nearness.
 
     known   float32 (k, 3), um, where values are known
     values  float32 (k,)

@@ -114,7 +114,7 @@ class Baker:
         """
         if self._corners is None:
             self._corners = cKDTree(self._vertices, balanced_tree=False, compact_nodes=False)
-        # A list of k numbers makes the result have k columns, even for k = 1.
+        # For a list of k numbers, the tree's query returns k columns, even for k = 1.
         columns = list(range(1, min(NEIGHBOURS, self._corners.n) + 1))
         distance, near = self._corners.query(points, k=columns)
         closeness: NDArray[np.float64] = 1 / np.maximum(distance, 1e-6)
@@ -125,7 +125,7 @@ class Baker:
 
 
 def bake(coarse: Mesh, size: tuple[int, int], baker: Baker) -> Maps:
-    """Return the maps of a level.
+    """Return the maps of a level of detail.
 
     coarse  a mesh with UVs and tangents
     size    (height, width), texels
@@ -196,7 +196,7 @@ def _in_frame(
 def fill(
     values: NDArray[np.float64], texel: NDArray[np.int64], size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return an image (h, w, k) of texel values; all other texels repeat the nearest one.
+    """Return an image (h, w, k) with values at some texels; all others repeat the nearest of these.
 
     values  float64 (n, k)
     texel   int64 (n,), row * w + column

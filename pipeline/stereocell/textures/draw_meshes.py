@@ -19,15 +19,15 @@ Box = tuple[tuple[float, ...], tuple[float, ...]]
 # Direction of the eye, from the front, above and the right: x right, y up, z towards the viewer.
 _EYE = np.array([0.42, 0.5, 1.0])
 _UP = np.array([0.0, 1.0, 0.0])
-# Linear light
+# Linear light from below and from above, 0..1
 _GROUND_LIGHT, _SKY_LIGHT = 0.06, 0.18
-# Direction (right, up, towards the eye) and light
+# Direction to each lamp (right, up, towards the eye), and its linear light, 0..1
 _LAMPS = (((-0.5, 0.7, 1.0), 0.85), ((0.9, 0.1, 0.5), 0.2))
 _GLOSS, _GLOSS_POWER = 0.12, 25.0
-_BACKGROUND = (0.0033, 0.0040, 0.0052)
-_LINES = (0.148, 0.171, 0.214)
+_BACKGROUND = (0.0033, 0.0040, 0.0052)  # linear RGB
+_LINES = (0.148, 0.171, 0.214)  # linear RGB of the outlines of boxes
 _FINE = 2  # factor by which an image is drawn larger and then averaged down
-_MARGIN = 1.04  # factor by which the view exceeds the frame
+_MARGIN = 1.04  # size of the drawn part of the scene, as a multiple of the frame's
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ def draw_pixels(
 def draw_side(shapes: Iterable[Shape], box: Box, axes: Vector, longest: int) -> NDArray[np.uint8]:
     """Return an image of meshes (h, w, 4) on a transparent ground, in parallel projection.
 
-    box      fills the image
+    box      box (corners x, y, z, world um) whose projection fills the image
     axes     (3, 3), columns are directions in the world: right, up, and to the eye
     longest  number of pixels of the longer edge
     """
@@ -183,7 +183,7 @@ def _light(normals: Vector, color: Vector) -> Vector:
 
 
 def _outline(picture: Vector, nearest: Vector, view: _View, ends: Vector) -> None:
-    """Draw the edges of a box where nothing is nearer. ends: (2, 3), corners of the box."""
+    """Draw the edges of a box where no surface is nearer. ends: (2, 3), corners of the box."""
     height, width = view.size
     for axis in range(3):
         beside, above = (axis + 1) % 3, (axis + 2) % 3

@@ -31,7 +31,8 @@ FINER = (0.5, 0.25, 0.0)
 # Largest number of triangles of another try, as a multiple of the first try's. Without it a wide
 # membrane that lacks 3 % of its volume would stay as large as the level before.
 MAX_HEAVIER = 1.5
-# Number of triangles that another try may have more in any case, because small levels are light
+# Number of triangles by which another try may always exceed the first, because small levels are
+# light
 MAX_MORE = 1000
 
 # Function of the finest level that is made, and of the indices of its vertices in the fine surface;
@@ -55,8 +56,8 @@ def make_levels(
 
     fine          positions float32 (n, 3) in um, world space (x, y, z)
     planes        the cut planes
-    spacing_um    of the voxels, (z, y, x)
-    box           of the tile, least and largest corner (x, y, z), um; vertices do not leave it
+    spacing_um    voxel spacing (z, y, x)
+    box           box of the tile, least and largest corner (x, y, z), um; vertices do not leave it
     caps          planes of caps, which stay flat
     get_texturer  None: levels get no values
     first         number of the first level that is made; `fine` is then the level before it
@@ -96,7 +97,8 @@ def make_levels(
             topology = topology or find_topology(mesh.triangles, len(mesh.positions))
         simplifier = Simplifier(mesh, planes, topology, caps)
         simplified, kept = _simplify(simplifier, topology, number, volumes, length, clock)
-        mesh, topology = simplified.mesh, simplified.topology  # earlier ones take much memory
+        # The earlier mesh and topology take much memory, which this frees.
+        mesh, topology = simplified.mesh, simplified.topology
         number, shown = number[simplified.vertices], kept.mesh
         with clock("measure"):
             if gone.any():
@@ -137,9 +139,9 @@ def _simplify(
 ) -> tuple[Simplified, RestoredLevel]:
     """Return a simplified level, and the same level with its volumes.
 
-    simplifier  of the level before
-    topology    of the level before
-    number      index of each of its vertices in the fine mesh
+    simplifier  holds the next finer level, which it simplifies
+    topology    topology of the next finer level
+    number      index of each vertex of the next finer level in the fine mesh
     """
     with clock("simplify"):
         simplified = simplifier.simplify(error_um)

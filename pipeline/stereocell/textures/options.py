@@ -18,8 +18,8 @@ from stereocell.model.spacing import Spacing
 
 # Allowed values of the largest edge of a map, in texels
 TEXTURES = tuple(2**k for k in range(6, 14))
-# Texels; with 24 mip levels 0 to 3 stay apart. xatlas then packs 2,500 charts in 7 s; with 64 it
-# takes 90 s.
+# Texels between charts. With 24 texels, charts do not mix in mip levels 0 to 3, and xatlas packs
+# 2,500 charts in 7 s; with 64 texels it takes 90 s.
 MAX_PADDING = 24
 # Largest number of texels along the finest voxel spacing. Texels finer than voxels show nothing
 # new. At a tenth xatlas is slow, and far below that it crashes.

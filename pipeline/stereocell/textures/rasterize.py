@@ -16,7 +16,7 @@ def find_texels(
     size: tuple[int, int],
     beyond: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the texels in and near triangles.
+    """Return the texels of a map that lie in or near a mesh's triangles.
 
     uvs        float32 (n, 2), origin at the lower left
     triangles  uint32 (m, 3)
@@ -36,7 +36,7 @@ def find_texels(
     weights_of = np.zeros((height * width, 3))
     for triangle, weights, texel, outside in _cover(corners, size, beyond):
         better = np.flatnonzero(outside < nearest[texel])
-        # The best one comes last, since the last assignment to a texel remains.
+        # The nearest triangle of a texel comes last, since the last assignment to a texel remains.
         order = better[np.argsort(-outside[better], kind="stable")]
         at = texel[order]
         nearest[at] = outside[order]
@@ -52,7 +52,7 @@ def find_pixels(
     *,
     nearest: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return the visible points of triangles in a view.
+    """Return the triangle that is visible at each pixel of an image, and the point on it.
 
     corners  float64 (m, 3, 2), pixels, x right, y down
     depth    float64 (m, 3), larger is nearer
@@ -90,7 +90,7 @@ def _cover(
     low, high = _boxes(corners, size, beyond)
     extent = np.maximum(high - low + 1, 0)
     frames, is_flat = _frames(corners)
-    count = np.where(is_flat, 0, extent.prod(axis=1))  # nothing is near flat triangles
+    count = np.where(is_flat, 0, extent.prod(axis=1))  # flat triangles cover no pixel
     ends = np.cumsum(count)
     first = 0
     while first < len(corners):
@@ -147,7 +147,7 @@ def _weigh(
 
     For a point beyond a corner, that is less than its distance from the corner.
 
-    frames  (10, n), numbers of each point's triangle
+    frames  (10, n), numbers of each point's triangle, from `_frames`
     """
     ax, ay, abx, aby, acx, acy, twice, *heights = frames
     x, y = x - ax, y - ay

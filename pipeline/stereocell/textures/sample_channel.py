@@ -22,7 +22,7 @@ def sample_channel(
     intensity_window: tuple[float, float],
     depth_um: float,
 ) -> NDArray[np.float32]:
-    """Return the intensity at each vertex, float32 (n,), 0..1.
+    """Return the sampled channel's intensity at each vertex, float32 (n,), 0..1.
 
     painted           the sampled channel's voxels (z, y, x); they cover `lattice.window`
     mesh              positions and unit normals in world space, um (x, y, z)

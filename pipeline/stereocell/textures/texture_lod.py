@@ -25,7 +25,7 @@ class VertexValues:
     paint: NDArray[np.float32] | None = None
 
     def at(self, vertices: NDArray[np.int64]) -> Baked:
-        """Return the values of some of the vertices, in 8 bits."""
+        """Return the values at the vertices with these indices, in 8 bits."""
         openness = np.round(self.openness[vertices] * 255).astype(np.uint8)
         if self.paint is None:
             return Baked(openness)
@@ -33,10 +33,12 @@ class VertexValues:
 
 
 class Texturer:
-    """Gives levels their values. Coarser levels have some of the finest level's vertices.
+    """Gives levels of detail their ambient occlusion and sampled channel, at vertices or as maps.
 
-    options     resolved
-    values      at the vertices of the finest level
+    The vertices of a coarser level are a part of the finest level's vertices.
+
+    options     options whose `auto` lengths are replaced, see `UnwrapOptions.resolved`
+    values      values at the vertices of the finest level
     get_source  returns the surface from which maps are baked; called only if maps are requested
     """
 
@@ -52,7 +54,7 @@ class Texturer:
         self._baker: Baker | None = None
 
     def texture(self, lod: Lod, level: int, vertices: NDArray[np.int64]) -> Lod:
-        """Return the level with maps, or with values at its vertices.
+        """Return a level of detail with maps, or with values at its vertices.
 
         level     number of the level, 0: the finest
         vertices  int64 (n,), index of each vertex in the finest level

@@ -12,8 +12,8 @@ only for the coarsest level.
 
 On six of the demo's units, lod1 to lod3, charts cover 15 to 38 % of the texels: they are small, and
 padding takes much of the rest. With 3 texels of padding (only mip level 0) they cover 25 to 41 %.
-With texels of a quarter, 6 to 13 times as many, they cover 38 to 55 %. Packing by brute force adds
-up to 4 %, and a larger `max_cost` of charts hardly anything.
+With texels a quarter as wide, 6 to 13 times as many, they cover 38 to 55 %. Packing by brute force
+adds up to 4 %, and a larger `max_cost` of charts hardly anything.
 """
 
 import atexit
@@ -73,7 +73,7 @@ def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
     """Return the mesh with UVs, or the reason why it has none: too many triangles or charts.
 
     mesh     positions float32 (n, 3) in um, triangles uint32 (m, 3); its normals do not change
-    options  resolved
+    options  options whose `auto` lengths are replaced, see `UnwrapOptions.resolved`
 
     Raises UsageError without xatlas, which is a package of the extra `maps`.
 

@@ -25,7 +25,7 @@ class BiasField:
 
     shape    (z, y, x), voxels
     terms    degrees (z, y, x) of each product
-    weights  of the products, in log intensity
+    weights  weight of each product, in log intensity
     """
 
     shape: tuple[int, int, int]
@@ -73,7 +73,7 @@ def fit_bias_field(
     residual: NDArray[np.float32],
     weights: NDArray[np.float32],
 ) -> BiasField:
-    """Return the field whose log is nearest to the residual.
+    """Return the bias field whose logarithm is nearest to the residual.
 
     indices   int64 (3, n), rows (z, y, x)
     residual  float32 (n,), log intensity that the classes do not explain

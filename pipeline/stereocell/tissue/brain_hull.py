@@ -77,7 +77,7 @@ def _inflate(
     depths = np.arange(1.0, DEEP_MM, EVERY_MM)
     near = int((depths < NEAR_MM).sum())
     edge_of = triangles[:, 0], triangles[:, 1]
-    padded = np.pad(field, 1).astype(np.float32)  # 0 beyond the ends
+    padded = np.pad(field, 1).astype(np.float32)  # voxels beyond the ends count as 0
     sharp, blunt = (1 / r for r in SMOOTH_MM)
     for _ in range(ITERATIONS):
         normals = _normals(points, triangles)
@@ -106,8 +106,8 @@ def fill_hull(
 ) -> NDArray[np.bool_]:
     """Return the voxels that the hull encloses or crosses, bool (z, y, x).
 
-    shape       (z, y, x), voxels
-    spacing_mm  (z, y, x)
+    shape       shape (z, y, x) of the result, voxels
+    spacing_mm  voxel spacing (z, y, x)
     shift_mm    (z, y, x), added to the hull's points
     """
     corners = (hull.points[hull.triangles] + np.asarray(shift_mm)) / np.asarray(spacing_mm)

@@ -32,7 +32,7 @@ ERODED_UM = 4500.0  # um; erosion that separates the brain from scalp, optic ner
 GYRI_UM = 3000.0  # um; bright tissue within this distance of the hull belongs to the brain
 RIM_UM = 12000.0  # um; largest distance of the fluid from the hull
 CALM = 0.3  # share of the dark voxels, of lowest gradient, in which bone and fluid are compared
-PARTED = 0.85  # least separability of two kinds, 0..1; an even distribution has .75
+PARTED = 0.85  # least separability of bone and fluid, 0..1; an even distribution has .75
 
 
 def find_foreground(smooth: NDArray[np.float32]) -> Mask:
@@ -101,7 +101,7 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
 
 
 def _levels(field: NDArray[np.float32], head: Mask, brain: Mask) -> Triple:
-    """Return the levels of find_hull: dark, least bright value, the brain's median."""
+    """Return the voxel values for `find_hull`: dark, least bright value, the brain's median."""
     dark, bright = float(np.percentile(field, 2)), float(np.percentile(field[head], 98))
     return dark, dark + 0.1 * (bright - dark), float(np.median(field[brain]))
 
@@ -151,7 +151,7 @@ def _separability(values: NDArray[np.float32]) -> float:
 def _coarsen(
     field: NDArray[np.float32], mask: Mask, spacing_um: Triple
 ) -> tuple[NDArray[np.float32], Mask, Triple]:
-    """Return smoothed means over blocks of COARSE_UM, the majority of the mask, and the spacing."""
+    """Return smoothed means over cubes of COARSE_UM, the mask by majority, and the spacing."""
     z, y, x = (max(1, round(COARSE_UM / h)) for h in spacing_um)
     d, h, w = (n // k for n, k in zip(field.shape, (z, y, x), strict=True))
 

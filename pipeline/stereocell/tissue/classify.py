@@ -37,7 +37,7 @@ MIN_SHARE = 0.01  # least share of the voxels in a class
 
 @dataclass(frozen=True, slots=True)
 class TissueOptions:
-    """How classes are learned."""
+    """How tissue classes are learned."""
 
     classes: int | Literal["auto"] = "auto"
     brain: bool = False  # learn only inside the brain: heads in MR
@@ -50,12 +50,12 @@ class TissueOptions:
     blur_voxels: float = 0.5
     smoothing_voxels: float = 0.8  # sigma in finest spacings, for both features
     prior: float = 0.6  # strength of the Potts prior
-    prior_rounds: int = 5  # rounds of its mean field
+    prior_rounds: int = 5  # rounds of the Potts prior's mean field
 
 
 @dataclass(frozen=True, slots=True)
 class Tissue:
-    """The learned classes, by rising intensity.
+    """The learned tissue classes, by rising intensity.
 
     probabilities  float32 (k, z, y, x), 0..1; their sum is 1 in the mask and 0 outside
     mask           bool (z, y, x): where classes were learned
@@ -98,9 +98,11 @@ def learn_tissue(voxels: NDArray[Any], spacing_um: Spacing, *, options: TissueOp
 
     counts = AUTO_CLASSES if options.classes == "auto" else [options.classes]
     flat = flat_field(shape, options.bias_degree)
-    # Each number of classes has a field of its own, because the two depend on each other.
+    # A bias field is learned for each number of classes, because field and classes depend on each
+    # other.
     fields = {k: _learn_field(flat, sampled, indices, k, options) for k in counts}
-    scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))  # voxels that smoothing makes dependent
+    # Number of voxels around each voxel that smoothing makes dependent on one another
+    scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))
     independent = min(1.0, int(inside.sum()) / len(calm) / max(scale, 1e-9))
     bic, has_modes = {}, {}
     for k, field in fields.items():
@@ -186,10 +188,10 @@ def _score(
     calm = samples[:, 1] <= np.quantile(samples[:, 1], 0.5)
     values = samples[calm, :1] / np.exp(log_field[calm])[:, None]
     mixture = _fit(values, count)
-    # Density of the voxels before correction
+    # Mean log-likelihood of the voxels as they were before the bias field was removed
     likelihood = float(mixture.score(values)) - float(log_field[calm].mean())
     n = max(2.0, independent * len(values))
-    parameters = 2 * count  # means, all shares except one, one variance
+    parameters = 2 * count  # free parameters: means, all shares except one, one variance
     order = np.argsort(mixture.means_[:, 0])
     means, shares = mixture.means_[order, 0], mixture.weights_[order]
     are_modes = _dips(values[:, 0], means) < SHALLOWEST_DIP

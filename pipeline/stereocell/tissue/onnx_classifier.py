@@ -39,7 +39,7 @@ NAMES_KEY = "stereocell_classes"  # metadata of the model: a JSON list of K name
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """A loaded model.
+    """A loaded network that classifies voxels.
 
     digest   SHA-256 of the file, hexadecimal
     patch    (z, y, x), voxels
@@ -54,7 +54,7 @@ class Network:
 
     @property
     def count(self) -> int:
-        """The number of classes that are shown."""
+        """The number of the network's classes that are shown."""
         return sum(bool(name) for name in self.classes)
 
     def settings(self) -> dict[str, Any]:
@@ -67,7 +67,7 @@ class Network:
         }
 
     def key_content(self) -> dict[str, Any]:
-        """Return the content that counts in a key."""
+        """Return the settings, by which `engine.step` decides whether a result is still valid."""
         return self.settings()
 
     @classmethod

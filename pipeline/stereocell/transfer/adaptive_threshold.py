@@ -51,7 +51,7 @@ Reading = Literal["two peaks", "no peak before", "single peak"]
 class Histogram:
     """Voxel counts in equal bins from `low` to `high`, in voxel values.
 
-    counts  (bins,), voxels
+    counts  number of voxels in each bin
     """
 
     counts: tuple[int, ...]
@@ -74,11 +74,11 @@ class Histogram:
 class Threshold:
     """A threshold, with the evidence for it that a chart shows.
 
-    value     voxels at or above it belong to the body; in voxel values
+    value     voxel value from which on voxels belong to the body
     peaks     levels of the peaks that count, rising, in voxel values
     between   the two peaks around the value, or the only one
     smoothed  float64 (bins,), the mean over the moving window, in voxels
-    reading   the case of the rule that applied
+    reading   the case of the rule that decided, such as "single peak"
     chance    levels of the peaks that counting noise may have caused
     """
 

@@ -44,7 +44,9 @@ MIN_SHARE = 0.05  # least share of a boundary in the voxels that all boundaries 
 # Least relative growth of squares without a boundary that passes over a third material
 MIN_MISSED = 0.05
 MIN_VOXELS = 2e-5  # least share of all voxels; a ball of 40 voxels in 256^3 has twice as many
-MIN_COUNT = 20.0  # voxels; cells with fewer get no more weight, because no edge is quite ideal
+# Number of voxels; cells of the histogram with fewer voxels get no more weight, because no edge is
+# quite ideal
+MIN_COUNT = 20.0
 MAX_BOUNDARIES = 6
 CLEAR = 2.0  # standard deviations of noise that a shape keeps away from a material's value
 EVEN: Ratios = (1.0, 1.0, 1.0)
@@ -55,12 +57,12 @@ class Boundary:
     """A boundary between two materials.
 
     low, high  values of the materials, 0..1 in the window
-    apex       steepest gradient along an axis across the edge, 0..1 of the scale's end; it may
-               exceed 1 a little
-    steepest   steepest gradient in the direction for which it is largest
+    apex       steepest gradient of an edge that is perpendicular to an axis, as a share of
+               `gradient_max`; it may exceed 1 a little
+    steepest   steepest gradient over all directions of the edge, as a share of `gradient_max`
     blur       sigma of the edge, in finest voxels
     share      share of all voxels that lie above the noise and that it explains
-    noise      gradient magnitude that noise may have at the middle value, 0..1 of the scale's end
+    noise      gradient that noise may have at the middle value, as a share of `gradient_max`
     sigma      standard deviation of the values' noise there
     """
 
@@ -128,7 +130,7 @@ def find_boundaries(
     """Return materials and boundaries of a histogram.
 
     counts        int64 (rows, columns), voxels by gradient magnitude and value; see count_joint
-    gradient_max  gradient magnitude of the last row
+    gradient_max  gradient magnitude that the histogram's last row stands for
     spacing_um    (z, y, x); only the ratios matter
 
     The same histogram always gives the same answer. A constant volume, or one of a single material,
@@ -194,10 +196,10 @@ class _EdgeSum:
     """The voxels above the noise, as a sum whose terms are to be found.
 
     matrix  (cells, terms): voxels from each boundary, and then each material; weighted
-    cells   (cells,): counted voxels; weighted
+    cells   (cells,): voxels counted in each cell of the histogram; weighted
     pairs   (boundaries,): the pair of materials of each boundary
-    blurs   (boundaries,): in finest voxels
-    seen    (boundaries,): voxels above the noise for an amount of 1
+    blurs   (boundaries,): sigma of each boundary's blur, in finest voxels
+    seen    (boundaries,): voxels above the noise, for each voxel of the edge's area
     """
 
     matrix: NDArray[np.float64]

@@ -36,18 +36,18 @@ from stereocell.transfer.shapes2d import fall_back
 
 BINS = 256
 BRIGHT_SHARE = 0.95  # share of an MR's tissue that is darker than the lightest grey
-_AT_ONCE = 1 << 20  # voxels
+_AT_ONCE = 1 << 20  # number of voxels that are counted together
 NO_SUGGESTION = SuggestedShapes(TransferFunctions2d(), "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelStatistics:
-    """The statistics of one channel.
+    """The statistics of one channel over the whole dataset.
 
-    window      lowest and highest voxel value
+    window      voxel values that become 0 and 255
     histogram   voxel counts in 256 bins of the window
-    background  that is subtracted; None: none is
+    background  values that a build subtracts from the voxels; None: it subtracts none
     suggested   2D function for the channel
     values      counts from which the threshold is found
     """
@@ -74,7 +74,7 @@ def find_statistics(
 
     voxels      any shape, any number type, voxel values; they are reordered in place, because the
                 peak memory of a small build would be a sorted copy
-    background  that is subtracted; None: none is
+    background  values that a build subtracts from the voxels; None: it subtracts none
     window      lowest and highest voxel value if known; None: they are found
 
     >>> z, y, x = np.ogrid[-16:16, -16:16, -16:16]
@@ -89,13 +89,14 @@ def find_statistics(
     if not high > low:  # a sparse channel has fewer bright voxels than the percentile leaves out
         low, high = float(voxels.min()), float(voxels.max())
     if not high > low:
-        high = low + max(1.0, 1e-6 * abs(low))  # more than float32 can distinguish
+        # The window becomes so wide that float32 distinguishes its ends.
+        high = low + max(1.0, 1e-6 * abs(low))
     if window is not None:
         low, high = window
     if voxels.dtype.kind == "f" and high - low < 1e-3 * max(abs(low), abs(high)):
         voxels = voxels.astype(np.float64)  # float32 has no edges for such narrow bins
     counts = np.zeros(BINS, np.int64)
-    # In parts, because a clipped integer takes eight bytes
+    # The voxels are counted in parts, because clipping turns each integer into eight bytes.
     for start in range(0, voxels.size, _AT_ONCE):
         part = np.clip(voxels[start : start + _AT_ONCE], low, high)
         counts += np.histogram(part, BINS, (low, high))[0]

@@ -29,7 +29,8 @@ _CONTRAST = (0.97, 0.5, 0.48)
 _BONE = (1.0, 1.0, 1.0)
 _SOFT_HU = 40.0  # Hounsfield units over which neighbouring bands blend
 _AIR_STEP_HU = 220.0  # Hounsfield units; least step over two voxels of an edge to air
-_FAT_FROM_HU = -150.0  # blurred skin has the values of the thinnest fat
+# Hounsfield units at which fat's band begins; below it, skin has such values when it is blurred
+_FAT_FROM_HU = -150.0
 # Largest ratio of the coarsest to the finest voxel spacing. Across thicker slices an edge to air is
 # as flat as one between tissues.
 MAX_UNEVEN = 3.0
@@ -39,7 +40,7 @@ _OPACITY, _SKIN_OPACITY, _BONE_OPACITY = 0.45, 0.95, 0.6
 
 
 def tissue_shapes(level: float, window: tuple[float, float], gradient_max: float) -> Shapes:
-    """Return the bands of tissues that lie in a window.
+    """Return a shape for each tissue's band of values that lies in a window.
 
     level         iso-value of the surface, Hounsfield units
     window        Hounsfield units that become 0 and 1

@@ -112,5 +112,6 @@ def _directions() -> Field:
 
 
 _NORMALS = _directions()
-# Noise of the difference along each axis, and of the value; the same in every call
+# Random numbers for the noise of the differences along three axes and of the value, for each point
+# across an edge and each direction; the same in every call
 _CHANCE = np.random.default_rng(0).standard_normal((4, PLACES, DIRECTIONS))

@@ -65,13 +65,14 @@ def count_joint(
     spacing_um    (z, y, x); only the ratios matter
     gradient_max  step of the last row, which also counts steeper voxels; row j stands for
                   j / (rows - 1) of it, and column k for the value k / 255
-    every         only one of this many planes is counted
+    every         only one of this many slices along z is counted
     """
     short = [(1, 1) if n < 3 else (0, 0) for n in voxels.shape]
     voxels = np.pad(voxels, short, mode="edge") if (1, 1) in short else voxels
     factor = np.float32((rows - 1) / (255 * gradient_max))
     counts = np.zeros(rows * COLUMNS, np.int64)
-    for z in range(1, len(voxels) - 1, every):  # by planes, which stay in the processor's cache
+    # The voxels are counted slice by slice, since slices fit into the processor's cache.
+    for z in range(1, len(voxels) - 1, every):
         steps = find_steps(voxels[z - 1 : z + 2], spacing_um)[0]
         row = np.minimum(steps * factor + np.float32(0.5), rows - 1).astype(np.intp)
         row *= COLUMNS
@@ -132,7 +133,7 @@ def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[
 
 
 def sample_boxes(region: Box, limit: int, largest: tuple[int, int, int] = SAMPLE_EDGE) -> list[Box]:
-    """Return boxes of a region with at most about `limit` voxels in all: the whole, or blocks.
+    """Return boxes of a region with at most about `limit` voxels: the whole region, or some blocks.
 
     Blocks are spaced evenly along each axis, from end to end, as many as the limit allows.
 

@@ -14,7 +14,7 @@ BRIGHT = 0.3  # value, 0..1, above which noise that rises with the value is look
 RISING_PERCENTILE = 10.0  # percent of the columns that may rise less than the noise
 FLAT_STEP = 3.0 / 255  # least noise, where values are 0..1: rounding to 8 bits and a slow drift
 MIN_IN_COLUMN = 2e-5  # least share of all voxels in a column whose mode is used
-MIN_SHARE = 0.004  # least share of the flat voxels in a material
+MIN_SHARE = 0.004  # least share of a material in the voxels whose gradient is only noise
 MIN_PROMINENCE = 0.2  # least prominence divided by the peak's height; a shoulder is not a material
 MAX_MATERIALS = 6  # largest number of materials of a channel
 
@@ -95,11 +95,11 @@ def find_peaks(curve: NDArray[np.float64]) -> list[int]:
 
 
 def bases_of(curve: NDArray[np.float64], peak: int) -> tuple[int, int]:
-    """Return the lowest places on both sides of a peak, up to where the curve exceeds it.
+    """Return the lowest columns on both sides of a peak, up to where the curve exceeds the peak.
 
     curve  float64 (columns,)
 
-    The nearest of equally low places is returned, as by `scipy.signal.peak_prominences`.
+    The nearest of equally low columns is returned, as by `scipy.signal.peak_prominences`.
     """
     higher = np.flatnonzero(curve > curve[peak])
     start = higher[higher < peak].max(initial=-1) + 1

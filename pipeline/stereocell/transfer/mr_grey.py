@@ -19,7 +19,7 @@ _LEAST_RANGE = 0.01  # share of the window: least distance from the foot to the 
 # air it is 1.6, and between tissues at most about 1.
 _STEEP = 1.1
 _STEEPEST = 0.8  # gradient, 0..1, above which a band has no edge of its own
-_EDGE_FROM = 0.6  # share of that step at which the colour of the edge begins
+_EDGE_FROM = 0.6  # share of the step of an edge to air at which the colour of the edge begins
 _EDGE_SOFTNESS = 0.3  # low, because a soft edge would mix with the dimmest tissue
 
 

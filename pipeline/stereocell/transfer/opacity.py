@@ -94,7 +94,7 @@ def make_transfer_functions(
             (0.85 * level, 0.0), (level, 0.5), (min(1.15 * level, 0.99), 0.0), (1.0, 0.0)
         ),
     }
-    # Opacity is 0 below it, so that the marcher skips such bricks
+    # Opacity is 0 below the threshold, so that the ray-marcher skips bricks without brighter ones.
     if threshold_normalized is not None:
         start = float(np.clip(threshold_normalized, 0.01, 0.97))
         top = start + min(RAMP, 0.9 * (1 - start))

@@ -116,7 +116,10 @@ def _across(
     softness: float,
     smallest: float,
 ) -> NDArray[np.float64]:
-    """Return the share of opacity between edges at least `smallest` from their middle."""
+    """Return how much a shape covers values, 0..1.
+
+    low, high  the shape's ends, which count as at least `smallest` away from its middle
+    """
     middle, half = (low + high) / 2, np.maximum((high - low) / 2, smallest)
     return _soften(1 - np.abs(value - middle) / half, softness)
 

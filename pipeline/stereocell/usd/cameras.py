@@ -34,11 +34,11 @@ def define_cameras(
     group: Sdf.Path = CAMERAS,
     unit_m: float = METERS_PER_UNIT,
 ) -> None:
-    """Define the cameras, which look along -z.
+    """Define the three cameras of a stage, which look along -z.
 
     box     (2, 3), lower and upper corner (x, y, z) of all content, in the world; the cameras
             stand in front of it
-    shown   (2, 3), the same corners of the visible content, which the cameras frame
+    shown   (2, 3), corners of the box around the visible content, which the cameras frame
     group   path of the cameras' parent prim
     unit_m  length of a stage unit, in metres
     """

@@ -15,9 +15,9 @@ from stereocell.model.channel import (
 
 @dataclass(frozen=True, slots=True)
 class StatedLevel:
-    """The level at which a surface was extracted; see model.channel.SurfaceLevel.
+    """The iso-value at which a surface was extracted; see model.channel.SurfaceLevel.
 
-    iso           level above the background, in voxel values
+    iso           iso-value above the background, in voxel values
     background    smallest and largest value of the background; None: the background is 0
     smoothing_um  sigma of the Gaussian that smoothed the voxels, in um
     """
@@ -36,9 +36,9 @@ class ComposedAppearance:
                     `window` unless an edit changed that
     surface         whether the channel has a surface, and whether the surface can be trusted
     surface_reason  why there is no surface, or why it is uncertain; else empty
-    level           level of the surface above the background; None: not stated
+    level           iso-value, background and smoothing of the surface; None: not stated
     chosen          name of the selected transfer function
-    transfer_2d     the two-dimensional transfer functions
+    transfer_2d     two-dimensional transfer functions, and their scale of gradients
     threshold       voxel value at which the specimen begins; None: not known
     opens           whether the channel is visible when the specimen is opened
     """

@@ -1,4 +1,4 @@
-"""Name the kind of place of each prim in a stage, as the keys of `edit_table` name it."""
+"""Find the place of each prim in a stage. A place is a prim's role, and a key of `edit_table`."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -21,7 +21,7 @@ _READER = "UsdPrimvarReader"
 
 
 class Places:
-    """Finds the place of a prim, such as `tile` or `mesh`.
+    """Finds the place of a prim, which is its role in the stage, such as `tile` or `mesh`.
 
     bound  paths of the materials that a layer binds
     """

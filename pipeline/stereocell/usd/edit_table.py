@@ -1,4 +1,6 @@
-"""The edits of a stage that a bundle takes over: one table of places and names.
+"""The edits of a stage that a bundle takes over: names of properties and metadata, by place.
+
+A place is the role of a prim in the stage, such as `tile`, `mesh` or `channel`.
 
 The readers of a composed stage read only these opinions. `find_lost_edits` compares the opinions of
 an artist's layers with the table and reports those that are missing in it. If you make a reader
@@ -112,7 +114,7 @@ TAKEN: dict[str, tuple[str, ...]] = {
     "light": (*_PLACED, *_SHOWN, *INPUTS, "@displayName"),
     "sphere": (*_PLACED, *_SHOWN, *INPUTS, "@displayName"),
     "lights": (*_PLACED, *_SHOWN),
-    # holds additions, lights or cameras
+    # A group is a prim that only holds additions, lights or cameras.
     "group": (*_PLACED, *_SHOWN, *_DISPLAYED),
     "addition": (
         *_PLACED,

@@ -25,10 +25,11 @@ BROADCAST = Sdf.Path("/__class__").AppendChild(ROOT.name)
 OPENING_CUT = "stereocell:openingCut"
 # Attribute of /Specimen: scale of the specimen in display.usda, see usd/write_display.py
 DISPLAY_SCALE = "stereocell:displayScale"
-PAINTED_BY = "stereocell:paintedBy"  # on a channel: ID of the channel whose intensity it shows
+# Attribute of a channel: ID of another channel, whose intensity colours this channel's surfaces
+PAINTED_BY = "stereocell:paintedBy"
 BUILT_COLOR = "stereocellBuiltColor"  # custom data of a surface's colour: its colour after a build
 CHANNELS = ROOT.AppendChild("Channels")
-# Parent of one prim per channel: its surfaces and volumes in all tiles inherit its visibility
+# Parent of one prim per channel. A channel's surfaces and volumes inherit that prim's visibility.
 SHOWN = ROOT.AppendChild("Shown")
 CLASSES = ROOT.AppendChild("Classes")  # for each channel, the materials of its object classes
 TILES = ROOT.AppendChild("Tiles")
@@ -47,7 +48,8 @@ SIDES = {
     "superior": "stereocell:superior",
 }
 
-# Attributes of a surface's mesh
+# Attributes of a surface's mesh: hash of its points and faces as built, and its distances from the
+# iso-surface, um (99th percentile, and largest)
 SHAPE_HASH = "stereocell:shapeHash"
 DISTANCE = "stereocell:distance"
 LARGEST_DISTANCE = "stereocell:largestDistance"

@@ -72,7 +72,7 @@ class Opinion:
 
 
 class BuiltLayers:
-    """The layers of a stage that a build wrote; false if there are none."""
+    """The layers of a stage that a build wrote. `bool()` of it is False if there are none."""
 
     def __init__(self, stage: Usd.Stage) -> None:
         self._folders = {

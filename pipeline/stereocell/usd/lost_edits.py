@@ -32,7 +32,7 @@ from stereocell.usd.specimen import specimen_of
 
 _BINDING = "material:binding"
 _COLLECTION = "collection:"
-# Places where a material's binding needs no strength: no stronger binding lies below them
+# Places where a bound material needs no `strongerThanDescendants`: no prim below has a binding
 _OWN_BINDING = ("mesh", "addition", "group")
 _MOST_LINES = 3  # largest number of similar edits with a line each; more of them share one line
 _GROUPS = ("Xform", "Scope", "")  # types of prims that only group other prims
@@ -43,9 +43,9 @@ _FLAT = (
 _BUILT = "built"  # place of prims that the build wrote and that no reader uses
 
 
-WHOLE = "@specifier"  # name that stands for the prim as a whole
-# Takes a place and a name of `edit_table`, and returns why a file format leaves that out; empty:
-# the format has it
+WHOLE = "@specifier"  # name of an edit that concerns a whole prim, not one of its properties
+# Takes a place and a name of `edit_table`, and returns why a file format leaves out such an edit;
+# empty: the format can hold the edit
 LeftOut = Callable[[str, str], str]
 
 
@@ -54,15 +54,15 @@ def _nothing(_place: str, _name: str) -> str:
 
 
 class _Fate(Enum):
-    """The reason why an opinion is not reported."""
+    """The reason why no message reports an opinion, although a layer states it."""
 
     TAKEN = 1  # the bundle takes it over
-    COVERED = 2  # a line about its prim, or about prims below a group, is enough
+    COVERED = 2  # another message reports it: on its prim, or on the prims in its group
 
 
 @dataclass(frozen=True, slots=True)
 class LostEdit:
-    """An edit that no bundle takes over.
+    """An edit of a user's layer that no bundle takes over.
 
     what    the prim with the property or the metadata, in the words of the message
     name    name of the property or the metadata; edits of one name and reason are similar
@@ -105,7 +105,7 @@ def require_no_lost_edit(
 ) -> None:
     """Raise StageError if an edit is lost, or if the stage is flattened, which hides its edits.
 
-    more   lines on edits that are lost in part
+    more   messages on edits that are lost in part
     taker  words of the message after "edits that"
     """
     layer, built = Path(stage.GetRootLayer().realPath), BuiltLayers(stage)
@@ -154,7 +154,7 @@ def _bound_materials(stage: Usd.Stage, built: BuiltLayers) -> set[Sdf.Path]:
 
 
 class _Finder:
-    """Decides for each opinion whether it is lost.
+    """Decides for each opinion of a user's layer whether a bundle loses it.
 
     An opinion on a class reaches several prims by inheritance. It counts once.
     """
@@ -170,7 +170,7 @@ class _Finder:
         self._covered: set[Sdf.Path] = set()
 
     def add(self, prim: Usd.Prim, opinion: Opinion) -> None:
-        """Judge an opinion at one of the prims that it reaches."""
+        """Decide, and keep, whether an opinion is lost at one of the prims that it reaches."""
         edit = self._judge(prim, opinion)
         self._found.setdefault(opinion.source, []).append(edit)
 
@@ -239,7 +239,7 @@ class _Finder:
             return LostEdit(str(path), "prim", "it is in a variant that is not selected")
         kind = str(own.GetTypeName()) if own else ""
         if kind in _GROUPS and not (own and own.IsAbstract()):
-            return _Fate.COVERED  # by the lines on the prims below it
+            return _Fate.COVERED  # messages on the prims in the group are enough
         self._covered.add(path)
         if not path.HasPrefix(self._specimen.root):
             reason = f"it lies outside {self._specimen.root}"
@@ -313,7 +313,10 @@ class _Finder:
         return ""
 
     def _repeats(self, attribute: Usd.Attribute, spec: Sdf.Spec) -> bool:
-        """Return whether an opinion repeats the value of the build, or else the type's default."""
+        """Return whether an opinion repeats the value of the build, or else the type's default.
+
+        The default counts only if the build states no value.
+        """
         if not attribute or not isinstance(spec, Sdf.AttributeSpec) or not spec.HasDefaultValue():
             return False
         below = [
@@ -341,7 +344,7 @@ def _words_for(prim: Usd.Prim, path: Sdf.Path, name: str) -> str:
 
 
 def _fallback(attribute: Usd.Attribute) -> object:
-    """Return the default that the type of an attribute's prim or shader defines; None: none."""
+    """Return an attribute's default by its prim's or shader's type; None: it has no default."""
     prim, name = attribute.GetPrim(), attribute.GetName()
     if prim.IsA(UsdShade.Shader) and name.startswith("inputs:"):
         node = Sdr.Registry().GetShaderNodeByIdentifier(str(UsdShade.Shader(prim).GetShaderId()))

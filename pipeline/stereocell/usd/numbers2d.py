@@ -41,7 +41,7 @@ def write_numbers(prim: Usd.Prim, transfer_2d: TransferFunctions2d) -> None:
 
 
 def read_numbers(prim: Usd.Prim) -> dict[str, float]:
-    """Return the numbers by field name, without those that the stage lacks.
+    """Return the numbers of a channel's 2D functions by field name; missing ones are left out.
 
     Stages that this pipeline wrote have all of them. Raises StageError for a number outside its
     limits.

@@ -32,7 +32,7 @@ _Types = Sdf.ValueTypeNames
 
 @dataclass(frozen=True, slots=True)
 class Addition:
-    """A mesh or curves that a layer adds.
+    """A mesh or curves that a user's layer adds to the specimen.
 
     path  path of the prim; it is unique
     name  display name, or else the name of the prim

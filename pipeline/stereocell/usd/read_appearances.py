@@ -174,7 +174,7 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
 def shows_at_first(prim: Usd.Prim) -> bool:
     """Return whether a channel, given by its material, is visible when the specimen is opened.
 
-    It is if the stage does not state it. Raises StageError for an animated visibility.
+    A channel without a stated visibility is visible. Raises StageError for an animated visibility.
     """
     stage = prim.GetStage()
     path = specimen_of(stage).shown.AppendChild(prim.GetName())

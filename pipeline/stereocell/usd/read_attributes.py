@@ -13,7 +13,7 @@ from stereocell.usd.typed_values import read_as, require_type
 Point = tuple[float, float, float]
 
 
-def value_of(prim: Usd.Prim, name: str, expected: Sdf.ValueTypeName) -> Any:  # USD's type of it
+def value_of(prim: Usd.Prim, name: str, expected: Sdf.ValueTypeName) -> Any:  # USD's own type
     """Return an attribute's value at the default time.
 
     Raises StageError if it has no value, or one of another type than `expected`.
@@ -53,7 +53,7 @@ def file_of(attribute: Usd.Attribute) -> Path:
 
 
 def color_of(attribute: Usd.Attribute, value: Any = None) -> tuple[float, float, float]:
-    """Return a colour, linear RGB. Raises StageError if it is missing or a part is outside 0..1.
+    """Return a colour, linear RGB. Raises StageError if it is missing or has values outside 0..1.
 
     value  one colour of an attribute that holds an array; None: the attribute holds one colour
     """
@@ -86,7 +86,7 @@ def numbers_of(prim: Usd.Prim, name: str, count: int) -> list[float]:
 
 
 def sizes_of(prim: Usd.Prim, name: str, count: int) -> list[int]:
-    """Return an attribute's whole numbers. Raises StageError unless there are `count`, none < 0."""
+    """Return an attribute's whole numbers. Raises StageError unless there are `count` from 0 up."""
     numbers = numbers_of(prim, name, count)
     if not all(number >= 0 and number.is_integer() for number in numbers):
         raise StageError(

@@ -35,9 +35,10 @@ def notes_on_bindings(stage: Usd.Stage) -> Iterator[str]:
 
 
 def binding_fault(prim: Usd.Prim, relationship: Usd.Relationship, *, is_own: bool = False) -> str:
-    """Return why a bound material has no effect on surfaces; empty: it has one, or was unbound.
+    """Return why a bound material does not affect surfaces; empty: it does, or it was unbound.
 
-    is_own  whether the binding needs no strength, as on a mesh, since no stronger one lies below
+    is_own  whether the binding works without the strength `strongerThanDescendants`, as on a mesh,
+            because no prim below it has a binding
     """
     if not relationship.GetTargets():
         return ""

@@ -44,7 +44,7 @@ _Types = Sdf.ValueTypeNames
 
 @dataclass(frozen=True, slots=True)
 class MadeMaps:
-    """Baked maps of a level that was computed again after an edit.
+    """Baked maps of a level of detail that was computed again after an edit.
 
     All are uint8: normals (h, w, 3), openness (h, w), sRGB colours (h, w, 3). None: no map.
     """
@@ -58,14 +58,14 @@ class MadeMaps:
 class ComposedLod:
     """A channel's surface in one tile at one level of detail, in world um.
 
-    level        0 is the finest level
+    level        level of detail, 0: the finest
     distance_um  99th percentile of the distances between mesh and iso-surface, both ways, um
     largest_um   largest of these distances, um; equal to `distance_um` in stages of earlier
                  versions, which do not state it
     matrix       (4, 4) for row vectors, from the mesh's own space to world um
-    shape        hash of the composed points and faces; empty if `built` is
-    built        the same hash as the build wrote it; empty: the stage has none
-    own          the 16 numbers of the transform on the mesh's prim
+    shape        hash of the composed points and faces; empty if `built` is empty
+    built        hash of the points and faces that the build wrote; empty: the stage has no hash
+    own          the 16 numbers, row by row, of the matrix (4, 4) that the mesh's own prim states
     lost         values that an edit of the faces made invalid: `maps`, `occlusion`, `colours`
     images       maps in memory, if the level was computed again: see bundle/edited_meshes.py
     """
@@ -85,7 +85,7 @@ class ComposedLod:
 
 
 def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
-    """Yield the levels of detail of a channel's surface in a loaded tile, finest first.
+    """Yield a channel's surface in a loaded tile at each level of detail, finest first.
 
     Yields nothing if the tile has no surface. Raises StageError for a mesh that can't be drawn, for
     example without a material.
@@ -159,14 +159,15 @@ def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> Compose
         has_color = False
     given = read_as(UsdGeom.Gprim(prim).GetDisplayColorAttr(), _Types.Color3fArray)
     colors = np.array(given or [], np.float64)
-    if not has_color and colors.size:  # the average of the mesh's colours replaces lost ones
+    # If colours no longer fit the faces, the mean of the mesh's colours replaces them.
+    if not has_color and colors.size:
         r, g, b = (shortest(part) for part in colors.reshape(-1, 3).mean(axis=0).clip(0, 1))
         lod = replace(lod, material=replace(lod.material, color=(r, g, b)))
     return replace(lod, lost=tuple(lost))
 
 
 def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
-    """Return an edited level's mesh in its own space. Raises StageError if there is none."""
+    """Return the mesh of an edited level in its own space. Raises StageError without a mesh."""
     prim = mesh_at(tile, channel_id, level)
     found = None
     if prim is not None:
@@ -180,7 +181,7 @@ def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
 
 
 def find_emptied(tile: Usd.Prim, channel_id: str) -> list[int]:
-    """Return the levels from which an edit removed all faces."""
+    """Return the levels of detail from which an edit removed all faces."""
     found = []
     for level in lod_levels(tile) or [0]:
         prim = mesh_at(tile, channel_id, level)
@@ -198,7 +199,7 @@ def count_faces(mesh: Usd.Prim) -> int:
 
 
 def mesh_at(tile: Usd.Prim, channel_id: str, level: int) -> Usd.Prim | None:
-    """Select a level of a tile and return its mesh; None: no mesh is drawn."""
+    """Select a tile's level of detail, and return a channel's mesh; None: no mesh is drawn."""
     if lod_levels(tile):
         select_variant(tile, "lod", f"lod{level}")
     prim = drawn(tile, tile.GetPath().AppendPath(f"{channel_id}/{channel_id}_{tile.GetName()}"))

@@ -30,7 +30,9 @@ from stereocell.usd.specimen import Specimen, specimen_of
 
 MAX_LAMPS = 3  # largest number of lamps in the viewer
 MAX_STRENGTH = 10.0  # largest strength of a lamp in the viewer; stronger lamps are dimmed to it
-_NEAREST = 0.25  # share of the specimen's longest edge: smallest distance of a lamp that counts
+# Smallest distance of a lamp, as a share of the specimen's longest edge; a nearer lamp is as bright
+# as one at this distance
+_NEAREST = 0.25
 _KINDS = (UsdLux.DistantLight, UsdLux.SphereLight, UsdLux.DomeLight, UsdLux.DomeLight_1)
 # Values that are supported for a dome's image: its projection, and the axis of its poles
 _KNOWN = {"inputs:texture:format": ("latlong", "automatic"), "poleAxis": ("Y", "scene")}
@@ -53,10 +55,10 @@ INPUTS = (
 
 @dataclass(frozen=True, slots=True)
 class StageLamp:
-    """A lamp of the viewer.
+    """A lamp of the viewer, made from a light of the stage.
 
-    color     linear RGB; the largest part is 1
-    strength  radiance of a white surface that the lamp lights, see the module
+    color     linear RGB; the largest of the three is 1
+    strength  radiance of a white surface that the lamp lights, see the module's docstring
     towards   unit vector (x, y, z) to a distant lamp, world; None for a sphere
     position  place of a sphere, um, world; None for a distant lamp
     """
@@ -70,11 +72,11 @@ class StageLamp:
 
 @dataclass(frozen=True, slots=True)
 class StageLights:
-    """The light of a stage.
+    """The light of a stage as the viewer shows it: lamps, and the light of the surroundings.
 
     lamps  the strongest lamps, at most MAX_LAMPS, strongest first
     lost   names of the weaker lamps, which are left out
-    room   radiance of all domes together; None: the stage has no dome
+    room   image of the radiance of all domes together; None: the stage has no dome
     """
 
     lamps: tuple[StageLamp, ...]

@@ -36,7 +36,7 @@ _Values = tuple[NDArray[np.float32], str]  # values (n, k) and their interpolati
 
 
 class LargeFaceError(StageError):
-    """A face has too many corners."""
+    """A mesh of the stage has a face with more than MAX_CORNERS corners."""
 
 
 def read_mesh(

@@ -84,7 +84,10 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
 
 
 def _colors_of(attribute: Usd.Attribute, data: dict[str, Any]) -> NDArray[np.float64]:
-    """Return the colours (n, 3) of a column's categories, clipped to 0..1. Raises StageError."""
+    """Return the colours (n, 3) of a column's categories, clipped to 0..1.
+
+    n is 0 if the column states no colours. Raises StageError for a value of another type.
+    """
     given = data.get("colors")
     if given is None:
         return np.zeros((0, 3))

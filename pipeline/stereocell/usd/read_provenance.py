@@ -46,7 +46,10 @@ def _fingerprints(stage: Usd.Stage) -> list[str]:
 
 
 def has_caps(stage: Usd.Stage) -> bool:
-    """Return whether surfaces are closed at the block's faces: true unless a layer denies it."""
+    """Return whether surfaces have caps, which close them at the ends of the built region.
+
+    A stage has caps unless its build's settings, in a layer's custom data, deny it.
+    """
     for layer in stage.GetUsedLayers():
         about = layer.customLayerData
         for name in ("stereocell", "settings", "surface", "caps"):

@@ -26,7 +26,9 @@ def read_shapes(prim: Usd.Prim) -> Shapes:
     """Return the shapes of a channel's selected transfer function; empty: the function is 1D.
 
     Kinds and boxes are required. Without the other arrays, tips are in the middle of the values,
-    shapes have the channel's colour with opacity 1, and softness is 0.5. Raises StageError.
+    shapes have the channel's colour with opacity 1, and softness is 0.5.
+
+    Raises StageError for an invalid shape, too many shapes, or arrays of different lengths.
     """
     boxes = [tuple(shortest(number) for number in box) for box in _values(prim, _BOXES)]
     count = len(boxes)
@@ -55,7 +57,10 @@ def _values(prim: Usd.Prim, name: str) -> list[Any]:  # items of the attribute's
 
 
 def _as_long(prim: Usd.Prim, name: str, count: int, default: list[Any] | None) -> list[Any]:
-    """Return an array with an entry for each shape, or the default. Raises StageError."""
+    """Return an array with an entry for each shape, or the default if the array is missing.
+
+    Raises StageError if the array has another length, or is missing without a default.
+    """
     values = _values(prim, name)
     if not values and default is not None:
         return default

@@ -23,12 +23,12 @@ class ComposedMaps:
 
     @property
     def files(self) -> list[Path]:
-        """The files of the maps that exist."""
+        """The image files of the maps that the surface has."""
         return [file for file in (self.normal, self.occlusion, self.color) if file is not None]
 
     @property
     def any(self) -> bool:
-        """Whether there is any map."""
+        """Whether the surface has at least one map."""
         return bool(self.files)
 
 

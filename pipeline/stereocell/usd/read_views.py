@@ -24,7 +24,7 @@ _OF_BUILD = ("mono", "left", "right")
 
 @dataclass(frozen=True, slots=True)
 class StageView:
-    """The view of a camera. Points (x, y, z) are in um of the world.
+    """A named view of the viewer, made from a camera. Points (x, y, z) are in um of the world.
 
     target    point that the viewer's camera orbits
     fov_deg   vertical field of view, degrees

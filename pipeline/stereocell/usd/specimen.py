@@ -29,7 +29,7 @@ _PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsDefined & 
 
 @dataclass(frozen=True, slots=True)
 class Specimen:
-    """The paths of a specimen's prims."""
+    """The paths of a specimen's prims in a composed stage."""
 
     root: Sdf.Path = ROOT
 
@@ -38,12 +38,12 @@ class Specimen:
 
     @property
     def channels(self) -> Sdf.Path:
-        """The parent of the channels' materials."""
+        """The path of the prim above the channels' materials."""
         return self._moved(CHANNELS)
 
     @property
     def shown(self) -> Sdf.Path:
-        """The parent of one prim for each channel.
+        """The path of the prim above one prim for each channel.
 
         By USD's `inherits`, all surfaces and volumes of a channel take their visibility from it.
         """
@@ -51,22 +51,22 @@ class Specimen:
 
     @property
     def classes(self) -> Sdf.Path:
-        """The parent of the materials for classes of objects."""
+        """The path of the prim above the materials for classes of objects."""
         return self._moved(CLASSES)
 
     @property
     def tiles(self) -> Sdf.Path:
-        """The parent of the tiles."""
+        """The path of the prim above the tiles."""
         return self._moved(TILES)
 
     @property
     def cameras(self) -> Sdf.Path:
-        """The parent of the build's cameras."""
+        """The path of the prim above the build's cameras."""
         return self._moved(CAMERAS)
 
     @property
     def lights(self) -> Sdf.Path:
-        """The parent of the build's lights."""
+        """The path of the prim above the build's lights."""
         return self._moved(LIGHTS)
 
     @property

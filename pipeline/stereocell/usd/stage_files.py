@@ -14,7 +14,7 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
     """Return every file of a stage: layers, also those of unselected variants, and assets.
 
     path       layer to open, which may be an artist's layer over a stage
-    stage_dir  folder of the stage
+    stage_dir  folder of the stage that the build wrote
 
     Only files in the folder of `path`, in `stage_dir` or below are opened. Raises StageError for a
     file outside them. Layers that can't be opened are not searched: `open_stage` reports them.
@@ -25,7 +25,7 @@ def dependencies(path: Path, stage_dir: Path) -> list[Path]:
     try:
         while waiting:
             for asset, name in _named_in(waiting.pop()):
-                # For a file inside a .usdz, this is the .usdz.
+                # For a file inside a .usdz archive, `file` is the path of the archive.
                 file = Path(Ar.SplitPackageRelativePathOuter(name)[0])
                 if name in names or not require_own(file, folders, named=asset, raised=StageError):
                     continue
@@ -54,7 +54,8 @@ def _named_in(name: str) -> Iterator[tuple[str, str]]:
         named = chain(*UsdUtils.ExtractExternalReferences(name)) if layer else ()
     except Tf.ErrorException:
         return
-    if layer and layer.expressionVariables:  # stronger layers could change the paths
+    # A stronger layer could give the expression variables other values, and so change paths.
+    if layer and layer.expressionVariables:
         raise StageError(
             f"{name}: found expressionVariables, expected none, because they change paths: write "
             "plain paths"

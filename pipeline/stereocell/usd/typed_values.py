@@ -20,7 +20,7 @@ _TEXTS = (Vt.StringArray, Vt.TokenArray)
 
 def read_as(
     attribute: Usd.Attribute | None, expected: Sdf.ValueTypeName, *, may_be_nan: bool = False
-) -> Any:  # USD's type of the attribute
+) -> Any:  # the type depends on the attribute
     """Return an attribute's value at the default time; None: it has no value.
 
     expected    expected type; another precision is accepted, and an integer instead of a float

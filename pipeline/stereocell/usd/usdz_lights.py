@@ -77,7 +77,7 @@ def _copy_light(light: Usd.Prim, small: Usd.Stage, as_written: AsWritten) -> dic
 def _pack_image(file: Path) -> tuple[str, bytes, float]:
     """Return the suffix and content of a light's image, and a factor for the light's intensity.
 
-    Raises StageError.
+    Raises StageError if an OpenEXR image can't be read.
     """
     if file.suffix.lower() == ".exr":
         pixels = read_rgb(file)

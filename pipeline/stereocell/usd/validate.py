@@ -312,7 +312,7 @@ def _check_grid(volume: Usd.Prim, asset: UsdVol.OpenVDBAsset) -> Iterator[Findin
     """Yield fields whose file lacks the grid or has another spacing: programs then draw nothing."""
     where, file = str(asset.GetPath()), read_as(asset.GetFilePathAttr(), _Types.Asset)
     if file is None or not file.resolvedPath:
-        return  # one of USD's validators reports it
+        return  # one of USD's validators reports a missing file
     try:
         grids = read_vdb_head(Path(file.resolvedPath))
     except StageError as error:

@@ -82,7 +82,7 @@ def define_objects(
     table: ObjectTable,
     touching: SharedInterfaces | None,
 ) -> None:
-    """Write the data of objects that all levels share: labels, names, interfaces, class materials.
+    """Write the objects' data for all levels of detail: labels, names, interfaces, classes.
 
     look      path of the mesh's material; those of the classes stand beside it
     touching  interfaces of these objects; None: not known
@@ -117,7 +117,7 @@ def write_objects(
 ) -> None:
     """Write the objects of one level: columns, colours and classes, as primvars and GeomSubsets.
 
-    made  mesh before its seams were joined
+    made  mesh as built, with vertices that are split along the seams of its UVs
     kept  indices of the vertices of `made` that are points of `mesh`
     """
     assert made.objects is not None

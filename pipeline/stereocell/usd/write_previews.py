@@ -29,8 +29,8 @@ _THUMBNAIL = "thumbnail.png"
 _THUMBNAIL_WIDTH = 512  # pixels
 _CARD_EDGE = 512  # pixels, longer edge of a card
 
-# Views of the six sides of the box: directions (x, y, z) that point right, up and to the viewer in
-# an upright image. The number of counterclockwise quarter turns fits the image to USD's card.
+# Cameras at the six sides of the box: directions (x, y, z) that point right, up and to the viewer
+# in an upright image. The number of counterclockwise quarter turns fits the image to USD's card.
 _SIDES = {
     "XPos": ((0, 0, -1), (0, 1, 0), (1, 0, 0), 3),
     "XNeg": ((0, 0, 1), (0, 1, 0), (-1, 0, 0), 1),

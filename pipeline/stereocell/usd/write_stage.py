@@ -88,12 +88,12 @@ class TileExtent:
 
     @classmethod
     def of(cls, tile: TileContent) -> "TileExtent":
-        """Return the extent of a tile."""
+        """Return the extent of a tile's content, without its voxels and meshes."""
         return cls(tile.id, tile.first_um, tile.last_um, tile.spacing_um)
 
     @property
     def drawn_box(self) -> NDArray[np.float64]:
-        """The drawn tile's corners (2, 3), (x, y, z) in um: half a voxel outside the centres."""
+        """Corners (2, 3), (x, y, z) in um, half a voxel outside the outermost voxels' centres."""
         half = np.asarray(self.spacing_um) / 2
         return np.array(world_box(self.first_um - half, self.last_um + half))
 
@@ -151,7 +151,7 @@ def write_stage(
     if has_sides:
         _state_sides(group.GetPrim(), move)
     boxes = np.zeros((len(tiles), 2, 3))
-    surfaces: dict[str, list[NDArray[np.float64]]] = {}  # boxes by channel
+    surfaces: dict[str, list[NDArray[np.float64]]] = {}  # boxes (2, 3), um, of surfaces
     for box, tile in zip(boxes, tiles, strict=True):
         prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
         Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
@@ -278,7 +278,8 @@ def _read_layer(
         if path.name != "extent":
             return
         extents.append(np.array(layer.GetAttributeAtPath(path).default, np.float64))
-        place = path.GetPrimPath().StripAllVariantSelections()  # variants do not state the type
+        # The type of a prim is stated outside of its variants.
+        place = path.GetPrimPath().StripAllVariantSelections()
         if layer.GetPrimAtPath(place).typeName == "Mesh":
             surfaces.setdefault(place.GetParentPath().name, []).append(extents[-1])
 

@@ -110,7 +110,7 @@ def _closed_name(channel_id: str) -> str:
 
 
 def _compose(tile: TileContent, has_vdb: bool) -> Sdf.Layer:
-    """Return the layer tile.usdc."""
+    """Return the layer of a tile, tile.usdc, before it is written."""
     stage = new_stage(".usdc", tile.id)
     root = UsdGeom.Xform.Define(stage, Sdf.Path.absoluteRootPath.AppendChild(tile.id)).GetPrim()
     Usd.ModelAPI(root).SetKind(Kinds.Tokens.component)
@@ -164,7 +164,7 @@ def _write_files(folder: Path, tile: TileContent, channel: ChannelContent, has_v
 
 
 def _images(channel: ChannelContent, lod: Lod) -> Iterator[tuple[Kind, NDArray[np.uint8]]]:
-    """Yield the maps of a level that has UVs: uint8, (h, w, 3) or (h, w)."""
+    """Yield the baked maps of a level of detail with UVs: uint8, (h, w, 3) or (h, w)."""
     if lod.normal_map is None:
         return
     yield "normal", lod.normal_map
@@ -202,7 +202,7 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
     mesh = UsdGeom.Mesh.Define(stage, branch.GetPath().AppendChild(_leaf(tile, channel)))
     mesh.GetPrim().AddAppliedSchema(SURFACE_API)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)  # the surface is open at the faces of its tile
+    mesh.CreateDoubleSidedAttr(True)  # its inside can be seen, since it is open at the tile's faces
     _bind(mesh, branch, _leaf(tile, channel, "_look"))
     if channel.objects is not None:
         look = branch.GetPath().AppendChild(_leaf(tile, channel, "_look"))
@@ -257,7 +257,7 @@ def _define_fields(volume: UsdVol.Volume, channel: ChannelContent) -> None:
 
 
 def _author_lods(root: Usd.Prim, tile: TileContent) -> None:
-    """Write each level's geometry into a variant. A channel with fewer levels repeats its last."""
+    """Write each level's geometry into a variant. A channel with fewer repeats its coarsest."""
     count = max((len(channel.lods) for channel in tile.channels), default=0)
     if count == 0:
         return

@@ -162,7 +162,7 @@ def _count_triangles(tile: Usd.Prim, channels: Collection[str], level: int) -> i
 def _read_parts(
     stage: Usd.Stage, prims: list[Usd.Prim], channels: Collection[str], level: int
 ) -> Iterator[_Part]:
-    """Yield each drawn mesh that has triangles, at a level or else the next finer one it has."""
+    """Yield each drawn mesh with triangles, at a level of detail or else the next finer one."""
     for name in [str(prim.GetName()) for prim in prims]:
         with loaded(stage, name) as (tile, _):
             for channel in channels:
@@ -197,7 +197,7 @@ def _define_parts(
     foot: NDArray[np.float64],
     scale: float,
 ) -> None:
-    """Define the meshes, tile by tile.
+    """Define the meshes of a usdz, tile by tile.
 
     foot   point (x, y, z) that moves to the origin, world um
     scale  metres in the file per um
@@ -239,7 +239,7 @@ def _define_additions(
 def _fill_mesh(mesh: UsdGeom.Mesh, shape: Mesh, positions: NDArray[np.float64]) -> None:
     points, triangles = vec3f(positions), shape.triangles.astype(np.int32)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)  # the surface is open at the faces of its tile
+    mesh.CreateDoubleSidedAttr(True)  # its inside can be seen, since it is open at the tile's faces
     mesh.CreatePointsAttr(points)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))
@@ -267,7 +267,7 @@ def _define_look(
 
 
 def _define_surface(stage: Usd.Stage, path: Sdf.Path, given: Material) -> UsdShade.Material:
-    """Define a material with plain values only."""
+    """Define a material of a usdz with plain values, without images."""
     material = UsdShade.Material.Define(stage, path)
     surface = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
     surface.CreateIdAttr("UsdPreviewSurface")

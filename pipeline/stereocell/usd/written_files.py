@@ -40,7 +40,7 @@ ADVICE = "put edits into a layer of your own over the stage"
 
 
 def write_list(stage_dir: Path, tiles: FileList, *others: Path) -> None:
-    """Write files.json: the given entries of `tiles`, and new entries for the files at `others`."""
+    """Write files.json: the entries `tiles`, and entries for files and folders `others`."""
     listed = {**tiles, **list_files(*others, root=stage_dir)}
     write_bytes(stage_dir / FILES, encode(listed))
 
@@ -94,7 +94,7 @@ def find_damage(root: Path, listed: FileList, *, since: Path | None = None) -> d
 
 
 def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
-    """Return the fault of a file that differs from the list."""
+    """Return the fault of a file that differs from the list: DAMAGED, CHANGED or DOUBTFUL."""
     if file.suffix not in LAYER_SUFFIXES:
         return DAMAGED
     with cached(file):

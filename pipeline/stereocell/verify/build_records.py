@@ -36,7 +36,7 @@ def check_records(out_folder: OutFolder) -> str:
 
 
 def check_report(out_folder: OutFolder) -> str:
-    """Check the report against the hash in it."""
+    """Check the report, an HTML page, against the hash that it holds."""
     for check in checks_of(out_folder, "report"):
         check()
     return f"{out_folder.report_file.name} is as written"

@@ -30,7 +30,7 @@ class BundleTask:
 
 @dataclass(frozen=True, slots=True)
 class TileFinding:
-    """The result of comparing one tile.
+    """The result of comparing one tile of a bundle with the stage.
 
     worst   largest distance of a vertex from its position in the stage, in lattice steps
     edits   a line for each surface that was edited by hand

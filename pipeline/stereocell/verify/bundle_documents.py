@@ -38,7 +38,7 @@ def check_usdz_of_bundle(bundle: Path) -> str:
 
 
 def check_volume_lists(bundle: Path) -> str:
-    """Check each volumes.json, and the hashes in it of the textures' mip levels."""
+    """Check each volumes.json, and compare the textures' mip levels with the hashes in it."""
     problems = []
     volumes = 0
     for channel in channels_of(bundle):
@@ -60,7 +60,10 @@ def check_volume_lists(bundle: Path) -> str:
 
 
 def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
-    """Return offset and length in bytes of a KTX2 file's levels; empty unless it has `count`."""
+    """Return the offset and the length, in bytes, of each mip level of a KTX2 file.
+
+    The list is empty if the file does not have `count` mip levels.
+    """
     try:
         with texture.open("rb") as file:
             head = file.read(80 + 24 * count)
@@ -72,7 +75,7 @@ def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
 
 
 def _damaged_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
-    """Return a problem for each level that doesn't match its hash."""
+    """Return a problem for each mip level that doesn't match its hash."""
     problems = []
     try:
         with texture.open("rb") as file:
@@ -137,7 +140,10 @@ def objects_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def check_objects(bundle: Path) -> str:
-    """Check that the files of each objects.json have a value for each row, and its rows exist."""
+    """Check that the files of each objects.json have a value per row, and tiles' rows exist.
+
+    The hashes of the parts of the exact values are checked, too.
+    """
     problems = []
     objects = 0
     for channel in channels_of(bundle):

@@ -23,7 +23,7 @@ from stereocell.verify.site_files import find_site_faults
 
 
 def check_tilesets(bundle: Path) -> str:
-    """Check that each content of the channels' tilesets exists and has the hash stated there."""
+    """Check that each file that a channel's tileset names exists and has the hash stated there."""
     contents = 0
     problems = []
     for channel in channels_of(bundle):

@@ -37,9 +37,11 @@ _MAP_DIFFERENCE = 1.0  # 0..255, largest mean difference of texels, since encode
 # very thin triangles
 _ODD_SHARE = 0.01
 _TURNED = math.radians(3)  # rad, largest difference of normals: two steps of 8-bit octahedral ones
-_UV_STEP = 1e-4  # share of a map's edge; six steps of 16 bits
-_ROUNDED = 1.001  # factor, since errors are rounded up to four digits
-_BOX_M = 2e-9  # m, since boxes are rounded outwards to whole nm
+_UV_STEP = 1e-4  # largest difference of a UV coordinate, 0..1; six steps of 16 bits
+# Factor by which a stated error may exceed the measured one, since it is rounded up to four digits
+_ROUNDED = 1.001
+# Metres by which a stated box may exceed its surfaces, since it is rounded outwards to whole nm
+_BOX_M = 2e-9
 _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
     "normalTexture": ("normal", encode_normal_map),
     "occlusionTexture": ("occlusion", encode_occlusion_map),
@@ -48,7 +50,7 @@ _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
 
 
 def without_repeats(lods: Sequence[ComposedLod]) -> Iterator[tuple[int, ComposedLod]]:
-    """Yield the levels that a bundle contains: of successive equal levels only the finest."""
+    """Yield the levels of detail in a bundle: the finest of several equal successive ones."""
     last: ComposedLod | None = None
     for lod in lods:
         if last is None or not _are_alike(last, lod):
@@ -72,7 +74,7 @@ def _are_alike(one: ComposedLod, other: ComposedLod) -> bool:
 def surfaces_of(
     bundle: Path, channel: dict[str, Any], tile_id: str
 ) -> Iterator[tuple[int, Content]]:
-    """Yield a tile's surfaces in a channel's tileset, by level."""
+    """Yield a tile's surfaces in a channel's tileset, each with its level of detail."""
     if channel["tileset"] is None:
         return
     for content in walk(bundle, bundle / channel["tileset"]["path"], tile_id):
@@ -122,7 +124,7 @@ def _compare_boxes(
         return
     low = np.min([low for low, _ in corners], axis=0).astype(np.float64)
     high = np.max([high for _, high in corners], axis=0).astype(np.float64)
-    # In meshes y points up, in boxes z.
+    # In meshes y points up, and in the boxes of tilesets z points up.
     low, high = np.array([low[0], -high[2], low[1]]), np.array([high[0], -low[2], high[1]])
     slack = _BOX_M + 4e-7 * max(float(np.abs(low).max()), float(np.abs(high).max()))
     for level, content in contents.items():
@@ -213,7 +215,7 @@ def _compare_faces(
     drawn: DecodedMesh,
     mesh: Mesh,
 ) -> Iterator[str]:
-    """Yield problems with the facing of triangles, and with their place in the maps.
+    """Yield problems with the facing of triangles, and with their texture coordinates.
 
     there, here  corners (n, 3, 3) of the stage's and of the bundle's triangles, m
     """
@@ -311,7 +313,7 @@ def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterat
         if path is None or (is_last and kind != "color" and name not in drawn.maps):
             if path is None and name in drawn.maps:
                 yield f"found a map ({kind}), but the stage has none"
-            continue  # the coarsest level needs no maps
+            continue  # the coarsest level may have its values at vertices instead
         if name not in drawn.maps:
             yield f"the map {named} is missing"
             continue

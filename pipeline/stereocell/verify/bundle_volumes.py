@@ -31,7 +31,7 @@ def find_volume(bundle: Path, channel: dict[str, Any], tile_id: str) -> dict[str
 
 
 def compare_volume(bundle: Path, entry: dict[str, Any], voxels: NDArray[np.uint8]) -> Iterator[str]:
-    """Yield problems with a volume's levels and bricks; `voxels`: uint8 (z, y, x)."""
+    """Yield differences of a volume's mip levels and bricks from `voxels`, uint8 (z, y, x)."""
     file = bundle / entry["file"]["path"]
     found, expected = read_texels(file), mip_levels(voxels)
     if [level.shape[:3] for level in found] != [level.shape for level in expected]:

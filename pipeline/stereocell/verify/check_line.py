@@ -9,9 +9,9 @@ _MAX_SHOWN = 3  # problems printed in one line
 
 @dataclass(frozen=True, slots=True)
 class CheckLine:
-    """One line of the result.
+    """One line of the result of a check.
 
-    detail  the parts that were checked, or the problem
+    detail  text on the parts that were checked, or on the problem
     """
 
     name: str

@@ -32,7 +32,7 @@ from stereocell.verify.stage_against_source import SourceTask, UnitFinding, comp
 
 
 def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator[CheckLine]:
-    """Yield a line for each comparison.
+    """Yield a line for each comparison of stage with source and of bundle with stage.
 
     stage  the layer that the bundle was exported from; None for OUT's own stage
 
@@ -151,13 +151,13 @@ def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, Sour
     for name, unit in unit_steps(plan, read_survey(out_folder)).items():
         tile_id, channel_id = name.split("/")
         if tile_id not in there:
-            continue  # the comparison of tiles reports this
+            continue  # the comparison of tiles reports a missing tile
         tile = plan.tile(tile_id)
         yield (
             name,
             SourceTask(
                 unit,
-                # This may be a unit that an earlier version has built.
+                # The folder may be that of a unit that an earlier version has built.
                 out_folder.unit_dir(name, index[name]),
                 out_folder.stage_file,
                 tile_id,

@@ -30,7 +30,10 @@ def check_textures(bundle: Path) -> str:
 
 
 def _run_node(script_name: str, paths: list[Path]) -> str:
-    """Run one script of viewer_gltf/tools on all files at once. Raises CheckError."""
+    """Run one script of viewer_gltf/tools on all files; return the number of files in words.
+
+    Raises CheckError if the script can't run, or finds a problem.
+    """
     if not paths:
         raise CheckError("found no file to check, expected some in the bundle")
     try:

@@ -70,7 +70,10 @@ class _SumsTask:
 
 
 def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> str:
-    """Compare a label map; return a line on the compared parts. Raises CheckError."""
+    """Compare a label map's objects with the source; return a line on the compared parts.
+
+    Raises CheckError if they differ.
+    """
     boxes = tile_boxes(TileGrid.of(plan, labels))
     steps = [
         (f"{tile}/{labels.name}", FindExtents(labels.voxels, box)) for tile, box in boxes.items()
@@ -221,7 +224,7 @@ def _odd_intensities(
 
 
 def _sum_up(task: _SumsTask) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return counts and sums of objects' voxels in a box.
+    """Return counts and sums of intensity over objects' voxels in a box.
 
     The first array (n,) has the number of each object's voxels. The second (3, n, images) has the
     sum of intensities, the number below the object's p95, and the number not above it.
@@ -299,7 +302,7 @@ def _odd_areas(
 def _read_tile(
     task: _TileTask,
 ) -> tuple[TileObjects | None, list[NDArray[np.float64]], Surfaces, float]:
-    """Read a tile's objects in the stage.
+    """Read the objects of a label map in one tile of the stage, and measure their surfaces.
 
     Returns the objects, their volumes by level (um^3), their finest surfaces, and the largest
     distance of those (um) from the surfaces that were measured.

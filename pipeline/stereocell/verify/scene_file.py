@@ -58,7 +58,7 @@ def check_scene(
 
 
 def _extract(content: SceneBlocks, bundle: Path) -> None:
-    """Write the bundle's files into a folder."""
+    """Write the files of a scene's bundle into a folder, where they are checked as a bundle."""
     for path, data in content.files.items():
         if not path.startswith(_LIGHTS):
             (bundle / path).parent.mkdir(parents=True, exist_ok=True)

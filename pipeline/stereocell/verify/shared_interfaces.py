@@ -19,7 +19,7 @@ _ODD = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)  # odd facto
 class Surfaces:
     """The finest surfaces of a tile's n objects.
 
-    labels      uint64 (n,)
+    labels      uint64 (n,), numbers of the objects in the label map
     area_um2    float64 (n,), area of each whole surface
     shared_um2  float64 (n,), area of its interfaces with other objects of the tile
     pairs       uint64 (m, 2), labels of two objects of the tile with an interface, each pair once
@@ -49,7 +49,7 @@ NO_SURFACES = Surfaces(
 
 
 def find_surfaces(mesh: Mesh, labels: NDArray[np.uint64], beyond: NDArray[np.float32]) -> Surfaces:
-    """Return the surfaces of a tile's objects.
+    """Return areas and shared triangles of the surfaces of a tile's objects.
 
     labels  uint64 (n,), labels in the order of `mesh.objects`
     beyond  float32 (tiles, 6), smallest and largest (x, y, z), um, of other tiles' objects

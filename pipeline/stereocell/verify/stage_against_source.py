@@ -46,13 +46,13 @@ _ALONG = 1 - 1e-6  # smallest cosine between equal normals, which is 0.08 degree
 
 @dataclass(frozen=True, slots=True)
 class SourceTask:
-    """One unit, and the tile of the stage that holds it.
+    """One unit (a channel in a tile), and the stage that holds its result.
 
     first_um       (z, y, x), um, centre of the unit's first voxel without the apron
     own_shape      (z, y, x), voxels of the unit without the apron
     placement      rows of a (4, 4) matrix for columns, um, from the voxels' world to the stage's
     samples        number of points that are spread over each surface
-    shares_volume  whether the channel's volume is another channel's
+    shares_volume  whether the channel's volume is that of another channel, so it has none itself
     has_vdb        whether the volumes are also written as .vdb, for other programs
     """
 
@@ -77,7 +77,7 @@ class SourceTask:
 
 @dataclass(frozen=True, slots=True)
 class UnitFinding:
-    """The result of one unit.
+    """The result of comparing one unit (a channel in a tile).
 
     levels  of each level, um: the distance that the stage states, and the distance (99th
             percentile) and the largest distance that were found
@@ -139,7 +139,7 @@ class _Surfaces:
         self._known: dict[int, Nearest] = {}
 
     def at(self, level: int) -> Nearest:
-        """Return the reference of a level."""
+        """Return the reference surface of a level of detail."""
         error = self._errors[min(level, len(self._errors) - 1)] * self._spacing
         gone = self._bodies.find(error)
         key = int(

@@ -210,8 +210,9 @@ def _write_light(layer, block, matrix, names, lost):
         set_value(layer, path, "inputs:angle", _Types.Float, math.degrees(light.angle))
         set_value(layer, path, "inputs:intensity", _Types.Float, light.energy)
     else:
-        # A point of P watts gives P / (4 pi d^2), a normalized sphere intensity / (4 d^2), where d
-        # counts in units of Blender and of the stage.
+        # At distance d, a point light of P watts in Blender gives P / (4 pi d^2), and a normalized
+        # sphere light in USD gives intensity / (4 d^2). Blender and the stage measure d in their
+        # own units.
         scale = abs(matrix.to_3x3().determinant()) ** (1 / 3)
         scale /= abs(block.matrix_world.to_3x3().determinant()) ** (1 / 3)
         radius = max(light.shadow_soft_size * scale, 1e-3)

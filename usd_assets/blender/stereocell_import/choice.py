@@ -12,10 +12,10 @@ AS_STAGED = "AS_STAGED"
 ROOT = "/Specimen"
 TILES = f"{ROOT}/Tiles"
 CHANNELS = f"{ROOT}/Channels"
-SHOWN = f"{ROOT}/Shown"  # has a prim for each channel, with its visibility in all tiles
+SHOWN = f"{ROOT}/Shown"  # parent of a prim for each channel, with its visibility in all tiles
 ALL = "ALL"
 METERS_PER_UNIT = 1e-6
-DISPLAY_SCALE = "stereocell:displayScale"  # on /Specimen: enlargement at display size
+DISPLAY_SCALE = "stereocell:displayScale"  # attribute of /Specimen: enlargement at display size
 
 
 @dataclass(frozen=True)

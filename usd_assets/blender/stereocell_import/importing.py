@@ -27,13 +27,13 @@ from .objects import keep_labels, read_columns
 from .problem import StageProblem
 from .snapshot import digest_nodes, take_materials, take_snapshot
 
-MICROMETRES, TRUE, DISPLAY = "MICROMETRES", "TRUE", "DISPLAY"  # sizes of an import
+MICROMETRES, TRUE, DISPLAY = "MICROMETRES", "TRUE", "DISPLAY"  # choices of the import's size
 STATE = "stereocell"
 PRIM = "stereocell_prim"
 COLOR = "stereocell_color_"
 VOLUME = "stereocell_volume_"
-PAINTED = "stereocell:paintedBy"  # on a channel: the channel that is painted on its surface
-COLUMNS = "stereocell:columns"  # on a label map's channel: its table columns
+PAINTED = "stereocell:paintedBy"  # attribute of a channel: the channel that colours its surfaces
+COLUMNS = "stereocell:columns"  # attribute of a label map's channel: the columns of its table
 
 
 class _Hook(bpy.types.USDHook):

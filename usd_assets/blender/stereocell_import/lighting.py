@@ -10,7 +10,7 @@ import bpy
 
 from .choice import ROOT
 
-BACKDROP = (0.0033, 0.0040, 0.0060)  # linear; the background of the web viewer
+BACKDROP = (0.0033, 0.0040, 0.0060)  # linear RGB; the background of the web viewer
 SAMPLES = 64  # samples per pixel of a Cycles render, which is denoised afterwards
 _WORLD = "StereoCell studio"
 _DOMES = ("DomeLight", "DomeLight_1")  # USD's type names

@@ -15,13 +15,15 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
-KEPT = "stereocell_objects"  # on the root object: the edits of each channel, as JSON
-LABELS = "stereocell_labels"  # on a mesh's object: the labels of its objects, as JSON
-CHANNEL = "stereocell_channel"  # on a mesh's object: its channel
+KEPT = "stereocell_objects"  # property of the root object: edits of objects by channel, as JSON
+# Properties of a mesh in Blender: labels of the label map's objects (JSON), and its channel
+LABELS = "stereocell_labels"
+CHANNEL = "stereocell_channel"
 OBJECT_ID, COLOR, HIDDEN = "objectId", "displayColor", "stereocell_hidden"
 AS_STAGED = "AS_STAGED"
 _NODE = "StereoCell column"  # label of the nodes that colour by a column
-_BEFORE = "stereocell_before"  # on a material: the node and socket that its colour was linked to
+# Property of a material: the node and socket that fed its colour before it was coloured by a column
+_BEFORE = "stereocell_before"
 # Linear RGB of the colour map viridis (Smith & van der Walt), at even steps
 _VIRIDIS = (
     (0.058, 0.0, 0.089), (0.045, 0.078, 0.256), (0.013, 0.275, 0.271), (0.119, 0.584, 0.129),
@@ -55,10 +57,10 @@ def keep_labels(stage, channels, objects):
 
 
 def kept(root):
-    """Return the edits of each channel's objects.
+    """Return the edits of the objects of label maps that the root object keeps, by channel.
 
-    The keys are `default` (a column), `colors` by label, `hidden` (labels), and `classes` (names by
-    column).
+    Each channel's edits have the keys `default` (the column for colours), `colors` (by label),
+    `hidden` (labels), and `classes` (names of categories, by column).
     """
     return json.loads(root.get(KEPT, "{}"))
 

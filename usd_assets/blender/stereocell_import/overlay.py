@@ -168,7 +168,7 @@ def _name_of(stage, layer):
     """Return the path from a layer to its stage, relative so that both can be moved together."""
     try:
         relative = os.path.relpath(stage.resolve(), layer.resolve().parent)
-    except ValueError:  # on another drive
+    except ValueError:  # on Windows, if the layer is on another drive than the stage
         return stage.as_posix()
     name = Path(relative).as_posix()
     return name if name.startswith("..") else f"./{name}"
@@ -197,7 +197,7 @@ def _write_looks(layer, stage, root, state):
         if _differ(points, look["points"]):
             pairs = Vt.Vec2fArray([Gf.Vec2f(*pair) for pair in points])
             place = path
-            if look["function"]:  # written into its variant; other functions keep their points
+            if look["function"]:  # points go into the function's variant; other functions stay
                 variant = Sdf.CreateVariantInLayer(
                     layer, path, "transferFunction", look["function"]
                 )
@@ -314,7 +314,7 @@ def _write_points(layer, stage, state, objects, lost):
             continue
         now = take_snapshot(block)
         if now["points"] == before["points"] or now["faces"] != before["faces"]:
-            continue  # find_losses reports changed faces
+            continue  # `snapshot.find_losses` reports changed faces
         if not path.startswith(f"{TILES}/"):
             lost.append(
                 f"the shape of {before['name']} is not taken over: an earlier layer added it: hide "

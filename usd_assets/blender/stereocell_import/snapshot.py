@@ -38,7 +38,8 @@ def take_snapshot(block):
 
 
 def _modifiers(block):
-    return [one.name for one in block.modifiers if one.name != HIDDEN]  # a layer carries it
+    # A layer carries hidden objects, so the modifier that hides them is not compared.
+    return [one.name for one in block.modifiers if one.name != HIDDEN]
 
 
 def take_materials(blocks):

@@ -154,7 +154,7 @@ namespace StereoCell.Editor
             }
         }
 
-        /// <summary>A member that every bundle must have.</summary>
+        /// <summary>Returns a member of a JSON object that every bundle must have.</summary>
         /// <exception cref="BundleException">The member is missing.</exception>
         static JToken Member(JToken from, string name)
         {

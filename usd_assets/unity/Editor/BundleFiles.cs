@@ -23,7 +23,7 @@ namespace StereoCell.Editor
     public sealed class BundleFiles : IDisposable
     {
         const string First = "manifest.json";
-        const int MostOfLink = 64 << 10;  // bytes
+        const int MostOfLink = 64 << 10;  // bytes, largest size of a link's file
 
         readonly ZipArchive zip;
         readonly string prefix = "";

@@ -23,11 +23,11 @@ namespace StereoCell.Editor
         [Min(1), Tooltip("Height of the screen, or of the image for one eye, in pixels.")]
         public int screenPixels = 1080;
 
-        const int MostOfUnity = 2048;  // texels along an edge of a 3D texture
+        const int MostOfUnity = 2048;  // largest number of texels along an edge of a 3D texture in Unity
 
         /// <summary>
-        /// The finest level at which no box of a tile has too many texels along an edge, and all boxes together fit into
-        /// the budget. The coarsest level is returned if no level fits.
+        /// The finest mip level at which no box of a tile has too many texels along an edge, and all boxes together
+        /// fit into the budget. The coarsest level is returned if no level fits.
         /// </summary>
         /// <param name="boxes">Sizes of each box's levels, finest first, and its number of channels.</param>
         public int LevelFor(IList<KeyValuePair<int[][], int>> boxes)

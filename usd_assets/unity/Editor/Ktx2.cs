@@ -17,7 +17,7 @@ namespace StereoCell.Editor
         public readonly int Depth;
         public readonly int Components;
 
-        /// <summary>Texels with x fastest, then rows, then slices; the components of a texel are adjacent.</summary>
+        /// <summary>Bytes: x is fastest, then rows, then slices. The components of a texel are adjacent.</summary>
         public readonly byte[] Texels;
 
         public Ktx2(byte[] data, int level)

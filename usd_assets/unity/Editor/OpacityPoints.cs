@@ -12,7 +12,7 @@ namespace StereoCell.Editor
     public static class OpacityPoints
     {
         public const int Samples = 256;
-        const int MostOfGradient = 8;  // keys
+        const int MostOfGradient = 8;  // largest number of keys of a gradient in Unity
 
         /// <summary>Opacity. Largest error of a function that is read from a table. The ends of a line and the samples are
         /// each rounded by up to half an 8-bit step.</summary>
@@ -31,7 +31,7 @@ namespace StereoCell.Editor
             return points;
         }
 
-        /// <summary>The points of one row of the table.</summary>
+        /// <summary>The points of the transfer function in one row of the table.</summary>
         /// <param name="rgba">Bytes of the table.</param>
         /// <param name="first">Index of the row's first byte.</param>
         public static List<Vector2> OfRow(byte[] rgba, int first)

@@ -195,7 +195,7 @@ namespace StereoCell
             }
         }
 
-        /// <summary>Apply the values of the fields to all renderers.</summary>
+        /// <summary>Apply the fields of specimen and channels to the renderers of surfaces and volumes.</summary>
         public void Apply()
         {
             if (colors == null) colors = new SurfaceColors();
