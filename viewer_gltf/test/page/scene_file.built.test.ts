@@ -160,7 +160,9 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     const [, least] = /expected at least ([\d.]+), as the page/.exec(refusal) ?? [];
     expect(Number(least)).toBeGreaterThan(0.5);
     const about = await write("small", String(Number(least) + 0.005));
-    expect(about).toMatch(/left out: \d+ finer levels? of detail, \d+ finer resolution levels? of volumes/);
+    expect(about).toMatch(
+      /left out: \d+ finer levels? of detail, \d+ finer resolution levels? of volumes/,
+    );
     await open("small", "?mode=all&quality=low");
     await viewer.settled();
     const { state, volumes } = await viewer.snapshot();
