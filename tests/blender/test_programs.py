@@ -80,7 +80,7 @@ def test_each_channel_has_the_hue_of_its_colour(pictures: Pictures, column: str)
 
 
 def test_three_draws_in_the_light_of_the_stage_as_storm_does(pictures: Pictures) -> None:
-    """Both programs interpret materials and lights in the same way."""
+    """Both Storm and three interpret materials and lights in the same way."""
     storm, three = (pictures[column].measures for column in ("Storm, stage", "three, glb"))
     assert three.luminance == pytest.approx(storm.luminance, abs=0.04)
 

@@ -33,7 +33,7 @@ def _units(source: Path, out: Path, *flags: str) -> OutFolder:
 
 
 def _lods(out_folder: OutFolder) -> dict[str, tuple[Lod, ...]]:
-    """Return the record of each unit, by `<tile>/<channel>`."""
+    """Return the levels of detail of each unit, by `<tile>/<channel>`."""
     built = {}
     for unit, key in out_folder.index().items():
         built[unit] = load_lods(out_folder.unit_dir(unit, key))

@@ -178,7 +178,7 @@ def test_a_zip_file_that_unpacks_to_more_than_its_array_is_refused(tmp_path: Pat
         dataset.read(0, dataset.levels[0].box)
 
 
-def test_a_zip_file_of_other_content_is_named(tmp_path: Path) -> None:
+def test_a_zip_file_of_other_content_is_refused_as_a_zip_archive(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         archive.writestr("notes.txt", "none")
     with pytest.raises(SourceError, match="a zip archive"):

@@ -16,7 +16,7 @@ from stereocell.model.errors import SourceError
 from support.dicom_reading import whole
 from support.phantoms import f_phantom
 
-SPACING = (0.5, 0.7, 2.0)  # mm along x, y, z as stored
+SPACING = (0.5, 0.7, 2.0)  # voxel spacing, mm, along x, y, z as stored
 # positions in the header of NIfTI-1, in bytes
 PIXDIM, SLOPE, UNITS, QFORM_CODE, QUATERN, SROW = 76, 112, 123, 252, 256, 280
 

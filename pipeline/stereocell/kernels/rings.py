@@ -50,7 +50,7 @@ class Ring(NamedTuple):
 
 
 def make_ring(n: int, *, is_surface: bool) -> Ring:
-    """Return arrays for a ring in a mesh of n vertices."""
+    """Return empty arrays for the ring of one vertex, in a mesh of n vertices."""
     most = MAX_NEIGHBOURS if is_surface else MAX_TRIANGLES
     first, room = np.empty(most, np.int32), 0 if is_surface else 2 * most
     return Ring(

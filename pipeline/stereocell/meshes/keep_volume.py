@@ -44,7 +44,7 @@ STEPS = 4  # number of Newton steps; volume is a cubic function of the distance
 FADE = 1.25
 TRIES = 12  # number of tries with shorter moves, after which a body with defects does not move
 SHORTENING = 0.5  # factor on the moves of vertices in defects, in each try
-MIN_WAY = 0.05  # share of the whole move below which a vertex in a defect does not move
+MIN_WAY = 0.05  # share of its whole move; a vertex in a defect that is left with less does not move
 MAX_VOLUME_ERROR = 0.03  # largest error of a body's volume, as a share of that volume
 
 FEW = 0.02  # share of a body's vertices; if fewer are held back, others do not move farther

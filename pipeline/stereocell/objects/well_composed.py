@@ -67,7 +67,8 @@ def _mend(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int3
                 flat[voxel] = label
                 touched.add(voxel)
                 changed.add(voxel)
-        # Thin objects are looked for in each round, since a noisy label map takes many rounds.
+        # Each round looks for thin objects, and the first ones end the work, because a noisy label
+        # map would take many rounds.
         thin = _find_thin(labels, mended)
         if len(thin):
             return mended, thin

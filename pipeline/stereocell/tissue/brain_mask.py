@@ -165,7 +165,7 @@ def _coarsen(
 
 
 def _shift(coarse_um: Triple, spacing_um: Triple) -> Triple:
-    """Return the centre of coarse voxel (0, 0, 0) from that of the fine one, (z, y, x), mm."""
+    """Return the vector from the centre of the first fine voxel to the coarse one's, mm."""
     z, y, x = ((c - f) / 2000 for c, f in zip(coarse_um, spacing_um, strict=True))
     return z, y, x
 

@@ -111,7 +111,7 @@ def _draw(
                 continue
             by_blender.append({**job, "by": program})
         else:
-            # A .glb has no lights. A .usdz has its own lights, except the image of the dome.
+            # A .glb has no lights. A .usdz lacks only the dome's image, which is added here.
             suns = lights["suns"] if kind == "glb" else []
             for_the_web.append({**job, "program": program, "lights": {**lights, "suns": suns}})
     draw_by_blender(by_blender, folder)

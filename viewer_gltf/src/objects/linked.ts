@@ -8,7 +8,7 @@ import { ALL_BYTES, type ObjectView, PALETTES, START_OBJECTS } from "../state/ob
 import { byteOf, byteValue } from "./palettes";
 import type { ObjectTable } from "./table";
 
-/** Widest gap, um, that a link may ask for; the panel's slider is shorter. */
+/** Widest gap between objects, um, that a link may ask for; the panel's slider is shorter. */
 const WIDEST_UM = 1000;
 /** Largest length of the text of one list of objects, in characters; a whole link may have 8000. */
 const LONGEST = 2000;
