@@ -29,7 +29,7 @@ export type PanelChange =
   | Readonly<{ panel: "histogram"; channel: string }>
   /** The selected shape, and the part of it that a pointer drags. */
   | Readonly<{ panel: "shape"; shape: SelectedShape | null; grab: Grab | null }>
-  /** Which number of the selected shape the keys change, such as its opacity: see edit_shapes.ts. */
+  /** The keys change one number of the selected shape, such as its opacity: see edit_shapes.ts. */
   | Readonly<{ panel: "shape-number"; id: string }>
   | Readonly<{ panel: "unfold"; section: string }>
   | Readonly<{ panel: "lenses"; lenses: Lenses }>
