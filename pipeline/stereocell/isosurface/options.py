@@ -165,8 +165,8 @@ class SurfaceOptions:
     )
     grid_um: float = setting(
         0.0,
-        "distance between planes of voxels that carry the surface; 0: all planes do; .42 alpha "
-        "shows what alpha does",
+        "distance between the planes of voxels from which the surface is made; 0: all planes; up "
+        "to 0.42 of alpha, every shape that alpha leaves is kept",
         bounds=LENGTH_UM,
     )
     max_thin: float = setting(
