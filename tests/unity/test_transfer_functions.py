@@ -103,7 +103,7 @@ def test_edits_of_the_window_reach_a_new_bundle(
     assert np.array_equal(lut[row, :, 3], expected)
     assert after["color"] == pytest.approx([0.21404114, 1, 0], abs=1e-6)
     assert after["opens"] is False
-    # Other functions and channels are unchanged.
+    # The edit leaves the other functions and channels unchanged.
     others = [i for i in range(len(before)) if i != row]
     assert np.array_equal(lut[others], before[others])
     blue = load(bundle / "manifest.json")["channels"][1]["name"]

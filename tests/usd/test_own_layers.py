@@ -197,7 +197,7 @@ def test_the_files_of_a_stage_are_all_found(out: Path) -> None:
     files = {path.relative_to(out / "stage").as_posix() for path in _all(out)}
     assert {"stage.usda", "looks/channels.usda", "tiles/r0_c1/tile.usdc"} <= files
     written = {p.relative_to(out / "stage").as_posix() for p in (out / "stage").rglob("*.*")}
-    # Other files name these, but they are not composed.
+    # Layers state the paths of these files, but the stage does not compose them.
     levels = {name for name in written if name.endswith("_level.json")}
     assert levels
     apart = {"display.usda", "nvindex.usda", "specimen.usdz", "files.json"}

@@ -98,8 +98,8 @@ def learn_tissue(voxels: NDArray[Any], spacing_um: Spacing, *, options: TissueOp
 
     counts = AUTO_CLASSES if options.classes == "auto" else [options.classes]
     flat = flat_field(shape, options.bias_degree)
-    # A bias field is learned for each number of classes, because field and classes depend on each
-    # other.
+    # A bias field is learned for each number of classes, because the field depends on the classes,
+    # and the classes on the field.
     fields = {k: _learn_field(flat, sampled, indices, k, options) for k in counts}
     # Number of voxels around each voxel that smoothing makes dependent on one another
     scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))

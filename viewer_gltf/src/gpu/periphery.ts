@@ -30,8 +30,8 @@ export class FilledPeriphery {
   }
 
   /**
-   * Fills the skipped pixels in both textures of the march, which has `scale` pixels for each pixel
-   * of the frame buffer along an edge.
+   * Fills the skipped pixels in both textures of the march. Along an edge, the march has `scale`
+   * pixels for each pixel of the frame buffer.
    */
   render({ textures }: WebGLRenderTarget, eyes: Eyes, scale: number): void {
     const { renderer, pass, target } = this;

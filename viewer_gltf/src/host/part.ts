@@ -94,8 +94,8 @@ export type Tap = Readonly<{
 export type TapAnswer = "used" | "shared" | null;
 
 /**
- * Functions by the name of the command. A function that returns false leaves the command to the
- * other parts.
+ * Functions by the name of the command. If a function returns false, the other parts
+ * get the command.
  */
 export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;
 

@@ -57,8 +57,8 @@ export const MEDIUM_NUMBERS = {
       "Shifts the transfer function: a higher value also shows darker material, a lower value only the brightest.",
   },
   /**
-   * Intensity, 0..1, below which a voxel counts as empty; 0: only the transfer function decides
-   * what is empty.
+   * Intensity, 0..1, below which a voxel counts as empty. With 0, only voxels without opacity in
+   * the transfer function count as empty.
    */
   threshold: {
     label: "Threshold",

@@ -216,8 +216,8 @@ function isTrial({ before_ms, before_notch, notch }: Quality): boolean {
 }
 
 /**
- * Learns the price of the notches between the previous and the present one, from the first window
- * of frames after a change.
+ * Learns the price of the notches between the previous and the present one, from the frames
+ * that first follow a change.
  */
 function withPrice(quality: Quality, mean_ms: number): Quality {
   const { before_ms, before_notch, notch } = quality;

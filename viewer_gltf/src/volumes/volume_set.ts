@@ -107,8 +107,8 @@ export class VolumeSet implements MarchedVolumes, Volumes {
   }
 
   /**
-   * A text that changes when a march would look different: with each loaded mip level and each step
-   * of a fade.
+   * A text that changes when a march would look different: with each loaded mip level, and
+   * during a fade with each step.
    */
   get marchKey(): string {
     return JSON.stringify([this.status(), this.marches.key]);
@@ -257,7 +257,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
 
   /**
    * Reports once that a volume can be drawn only at a mip level that is coarser than the finest one
-   * of its file.
+   * in the volume's file.
    */
   private reportLimit({ volume }: VolumeSource): void {
     const { side } = this.limits;
