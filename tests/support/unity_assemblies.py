@@ -10,8 +10,8 @@ STUBS = HERE / "stubs"
 NEWTONSOFT = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")  # place in Debian
 ZIP = "System.IO.Compression.FileSystem.dll"  # part of Mono, in a separate package of Debian
 
-# Scripts of each assembly, and the assemblies that it may use. For an assembly of the package, these
-# are the ones that its .asmdef names.
+# Scripts of each assembly, and the assemblies that it may use. For one of the package, these
+# are the names in its .asmdef.
 ENGINE = ("UnityEngine",)
 EDITOR = (*ENGINE, "UnityEditor", NEWTONSOFT.stem)
 ASSEMBLIES: dict[str, tuple[list[Path], tuple[str, ...]]] = {

@@ -22,6 +22,7 @@ from stereocell.isosurface.options import (
     IsoValueOptions,
     parse_level,
 )
+from stereocell.model.counted import counted
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Tile
 from stereocell.planning.channels import Channel
@@ -145,7 +146,8 @@ def find_level(
         place = LEVEL_NAMES[wanted]
         if place >= len(clear):
             reason = (
-                f"no clear surface: found {len(clear)} clear iso-values, none of them the {wanted}"
+                f"no clear surface: found {counted(len(clear), 'clear iso-value')}, and no "
+                f"{wanted} one"
             )
         clear = clear[place : place + 1]
     return Found(window, levels, evidence, clear, levels.subtracts, reason)
