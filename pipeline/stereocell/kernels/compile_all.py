@@ -43,7 +43,12 @@ from stereocell.kernels.interfaces import (
     slope_volumes,
     smooth_interfaces,
 )
-from stereocell.kernels.level_sums import count_differences, sum_by_value
+from stereocell.kernels.level_sums import (
+    count_differences,
+    sum_along_axes,
+    sum_by_value,
+    sum_neighbours,
+)
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.nearest import find_nearest, find_sides
 from stereocell.kernels.rims import thin_rim
@@ -137,9 +142,11 @@ def compile_others() -> None:
     measure_slopes(voxels, steps)
     divide_by_slopes(voxels, steps, 1e-6, 2.0)
     mask, every = voxels > 0, np.array([[0, 3]] * 3, np.int64)
-    one_bin, small = np.zeros(1 << 15, np.int16), np.float32(0.1)
+    one_bin, small = np.zeros(1 << 16, np.int16), np.float32(0.1)
     sum_by_value(voxels, mask, every, steps, one_bin, small, small, small, 1)
     count_differences(voxels, mask, every, 1, one_bin, steps)
+    sum_along_axes(voxels, mask, every)
+    sum_neighbours(np.zeros((3, 3)), mask[0], every[1:], steps, np.zeros((7, 3)))
     move_off_zero(voxels, np.float32(0.01))
     close_gaps(voxels, steps, 1.0, 1.0)
     first_run, start, stop = find_runs(mask)

@@ -95,7 +95,7 @@ class FindWindow(Step[Window]):
     window         display window in voxel values, if the settings state it; None: it is found
     """
 
-    VERSION: ClassVar[int] = 1
+    VERSION: ClassVar[int] = 2
     FORM: ClassVar[Document[Window]] = WINDOW
 
     voxels: Voxels
