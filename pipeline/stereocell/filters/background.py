@@ -11,7 +11,7 @@ result is subtracted, and the same is repeated on the remainder. On bodies over 
 to three times their height, Dice is .93. It was .14 with three passes instead of six, and .37 with
 a field that was constant beyond the outermost centres (docs/decisions/levels.md).
 
-Of large blocks only the voxels whose three indices are all even or all odd are looked at, a quarter
+In large blocks only the voxels whose three indices are all even or all odd are looked at, a quarter
 of them. They treat all axes alike. Even and odd lines count equally often, because a scanner may
 record them differently.
 """

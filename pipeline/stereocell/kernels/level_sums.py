@@ -71,7 +71,7 @@ def count_differences(
            and the next one
     edges  ends of the bins, rising; larger differences count in the last bin
     """
-    counts, last = np.zeros(len(edges) - 1, np.int64), len(edges) - 2
+    counts, last = np.zeros(len(edges) - 1, np.int64), np.int64(len(edges) - 2)
     width = max(min(own[2, 1], field.shape[2] - lag) - own[2, 0], 0)
     sizes = np.empty(width, np.float32)
     bits = sizes.view(np.uint32)
