@@ -55,7 +55,9 @@ from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
+from stereocell.kernels.solid_counts import count_inside
 from stereocell.kernels.union_find import label_pairs
+from stereocell.kernels.value_counts import count_values
 from stereocell.kernels.visibility import cast_rays
 from stereocell.kernels.xxhash import xxh32
 
@@ -146,6 +148,9 @@ def compile_others() -> None:
     sum_by_value(voxels, mask, every, steps, one_bin, small, small, small, 1)
     count_differences(voxels, mask, every, 1, one_bin, steps)
     sum_along_axes(voxels, mask, every)
+    count_values(steps, np.arange(2.0), 0.0, 1.0, True, np.zeros(1, np.int64))
+    ones = np.ones(9, np.int64)
+    count_inside(voxels, mask, ones, ones, ones.astype(np.float32))
     sum_neighbours(np.zeros((3, 3)), mask[0], every[1:], steps, np.zeros((7, 3)))
     move_off_zero(voxels, np.float32(0.01))
     close_gaps(voxels, steps, 1.0, 1.0)
