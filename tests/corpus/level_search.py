@@ -1,6 +1,7 @@
 """Run the product's search for iso-values on a case."""
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -85,7 +86,7 @@ def search_levels(case: Case) -> LevelSearch:
                 spacing_um=case.spacing_um,
                 counting=counting,
                 start=tuple(side.start for side in place),
-                background=None if under is None else under[window],
+                background=None if under is None else partial(_slices_of, under[window]),
             ),
         )
         for place in _places(voxels.shape, case.grid)
@@ -101,6 +102,10 @@ def search_levels(case: Case) -> LevelSearch:
     if found.subtracts and under is not None:
         values -= under
     return LevelSearch(case, truth, field, above, values, padding, tiles, scale, found)
+
+
+def _slices_of(under: NDArray[np.float32], first: int, stop: int) -> NDArray[np.float32]:
+    return under[first:stop]
 
 
 def _places(shape: tuple[int, ...], grid: tuple[int, int]) -> list[Slices]:

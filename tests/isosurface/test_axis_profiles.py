@@ -12,12 +12,17 @@ CUTS = [((0, 20), (0, 30), (0, 40))]
 TILES = [((0, 20), y, x) for y in ((0, 11), (11, 30)) for x in ((0, 25), (25, 40))]
 
 
+def _all_of(field: NDArray[np.float32]) -> tuple[slice, slice, slice]:
+    depth, height, width = field.shape
+    return slice(0, depth), slice(0, height), slice(0, width)
+
+
 def _share(field: NDArray[np.float64], cuts: list[tuple[tuple[int, int], ...]] = CUTS) -> float:
     field = np.broadcast_to(field, SHAPE)
     tiles = []
     for (z0, z1), (y0, y1), (x0, x1) in cuts:
         part = np.ascontiguousarray(field[z0:z1, y0:y1, x0:x1], np.float32)
-        tiles.append(Profiles.of(part, np.ones(part.shape, bool), (z0, y0, x0)))
+        tiles.append(Profiles.of(part, np.zeros(part.shape, bool), _all_of(part), (z0, y0, x0)))
     return share_of_light(tiles, tiles, variance=float(field.var()))
 
 
@@ -55,8 +60,9 @@ def test_a_slab_that_fills_the_field_is_a_body() -> None:
 def test_padding_is_left_out_of_the_profiles() -> None:
     field = np.broadcast_to(5.0 + X, SHAPE).astype(np.float32)
     kept = np.broadcast_to((Y > 3) & (Z < 15), SHAPE)
-    tile = Profiles.of(np.where(kept, field, np.float32(1e6)), kept, (0, 0, 0))
+    hidden = np.where(kept, field, np.float32(1e6))
+    tile = Profiles.of(hidden, ~kept, _all_of(field), (0, 0, 0))
     variance = float(field[kept].var())
     assert share_of_light([tile], [tile], variance=variance) == pytest.approx(1.0, rel=1e-5)
-    nothing = Profiles.of(field, np.zeros(SHAPE, bool), (0, 0, 0))
+    nothing = Profiles.of(field, np.ones(SHAPE, bool), _all_of(field), (0, 0, 0))
     assert share_of_light([nothing], [nothing], variance=1.0) == 0.0

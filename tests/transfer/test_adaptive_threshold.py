@@ -23,6 +23,7 @@ from stereocell.steps.find_window import Window, window_from_json, window_to_jso
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
     Threshold,
+    count_in_bins,
     find_adaptive_threshold,
     make_histogram,
     smooth,
@@ -403,3 +404,18 @@ def test_an_edited_threshold_reaches_the_bundle(
         assert normalized is None
     else:
         assert normalized == pytest.approx(max(0, (expected - low) / (high - low)), abs=1e-6)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, ">u2", np.int32, np.float32, np.float64])
+@pytest.mark.parametrize("clips", [False, True])
+def test_bins_hold_the_same_voxels_as_those_of_numpy(dtype: str | type, clips: bool) -> None:
+    """Values on the edges are the ones that rounding could move into the next bin."""
+    edges = np.linspace(0.1, 90.7, 152)
+    near = np.concatenate([np.nextafter(edges, 0), edges, np.nextafter(edges, 100), [0, 99, 1e6]])
+    voxels = (near if np.dtype(dtype).kind == "f" else np.arange(120)).astype(dtype)
+    values = voxels.astype(np.float64)
+    low, high = 5.0, 90.0
+    kept = np.clip(values, low, high) if clips else values[(values >= low) & (values <= high)]
+    expected, _ = np.histogram(kept, edges)
+    found = count_in_bins(voxels[None, :], edges, (low, high), clips=clips)
+    np.testing.assert_array_equal(found, expected)

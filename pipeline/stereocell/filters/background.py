@@ -10,8 +10,14 @@ Where the background rises within a block, a low percentile is that of the block
 result is subtracted, and the same is repeated on the remainder. On bodies over a ground that rises
 to three times their height, Dice is .93. It was .14 with three passes instead of six, and .37 with
 a field that was constant beyond the outermost centres (docs/decisions/levels.md).
+
+In large blocks only the voxels whose three indices are all even or all odd are looked at, a quarter
+of them. They treat all axes alike. Even and odd lines count equally often, because a scanner may
+record them differently.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise, product
 from math import ceil
 from typing import Any
@@ -27,6 +33,10 @@ from stereocell.model.tiling import Box
 PERCENTILE = 15.0  # percent of a block's voxels; the background is this percentile
 SMOOTHING = 0.7  # sigma in blocks; lowers the value of a block that a body fills completely
 PASSES = 6
+# Mean number of voxels of a block from which a quarter of them is enough. The percentile then lies
+# within 1 of PERCENTILE, and within a thirtieth of the noise's deviation.
+LARGE = 8192
+_PLANES = 16  # planes from which a background is subtracted at once
 
 
 def find_background(
@@ -56,23 +66,22 @@ def find_background(
         for n, count in zip(field.shape, blocks, strict=True)
     ]
     z, y, x = (tuple((a + b - 1) / 2 for a, b in pairwise(edge.tolist())) for edge in edges)
+    starts, every = ((0, 1), 2) if field.size >= LARGE * np.prod(blocks) else ((0,), 1)
+    samples = [_Sample.of(field, padding, start, every) for start in starts]
     inner = np.zeros(blocks)
-    found = LatticeField((z, y, x), inner)
     for _ in range(passes):
         knots = np.full(blocks, np.nan)
         for place in product(*(range(count) for count in blocks)):
-            sides = [(int(e[i]), int(e[i + 1])) for e, i in zip(edges, place, strict=True)]
-            block = tuple(slice(*side) for side in sides)
-            (z0, z1), (y0, y1), (x0, x1) = sides
-            # The memory is bounded by one block: the whole field as float32 would be the peak of a
-            # small build.
-            rest = field[block].astype(np.float32) - found.at(Box((z0, y0, x0), (z1, y1, x1)))
-            if padding is not None:
-                rest = rest[~padding[block]]
-            if rest.size:
-                knots[place] = np.percentile(rest, PERCENTILE)
-        inner = inner + _smooth(knots)
-        found = _to_the_ends(LatticeField((z, y, x), inner), field.shape)
+            block = [(int(e[i]), int(e[i + 1])) for e, i in zip(edges, place, strict=True)]
+            values = np.concatenate([sample.within(block) for sample in samples])
+            if values.size:
+                knots[place] = np.percentile(values, PERCENTILE, overwrite_input=True)
+        rise = _smooth(knots)
+        inner = inner + rise
+        above = _to_the_ends(LatticeField((z, y, x), rise), field.shape)
+        for sample in samples:
+            sample.subtract(above)
+    found = _to_the_ends(LatticeField((z, y, x), inner), field.shape)
     z, y, x = (
         tuple(float(start + (centre + 0.5) * size / n - 0.5) for centre in centres)
         for centres, start, size, n in zip(
@@ -80,6 +89,51 @@ def find_background(
         )
     )
     return LatticeField((z, y, x), found.values)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sample:
+    """Every k-th voxel along each axis, from which the background found so far was subtracted.
+
+    values  float32 (z, y, x), voxel values
+    kept    bool, the same shape: voxels that are not padding; None: no voxel is
+    start   index of the first voxel along each axis
+    every   k
+    """
+
+    values: NDArray[np.float32]
+    kept: NDArray[np.bool_] | None
+    start: int
+    every: int
+
+    @classmethod
+    def of(
+        cls, field: NDArray[Any], padding: NDArray[np.bool_] | None, start: int, every: int
+    ) -> "_Sample":
+        taken = (slice(start, None, every),) * 3
+        kept = None if padding is None else ~padding[taken]
+        return cls(field[taken].astype(np.float32), kept, start, every)
+
+    def within(self, block: Sequence[tuple[int, int]]) -> NDArray[np.float32]:
+        """Return the values within a block (first and end of each axis), float32 (n,)."""
+        z, y, x = (
+            slice(*(max(0, -((self.start - end) // self.every)) for end in ends)) for ends in block
+        )
+        values = self.values[z, y, x]
+        return values.ravel() if self.kept is None else values[self.kept[z, y, x]]
+
+    def subtract(self, rise: LatticeField) -> None:
+        """Subtract a field whose centres count voxels, in place."""
+        z, y, x = (
+            tuple((place - self.start) / self.every for place in axis) for axis in rise.centres
+        )
+        own = LatticeField((z, y, x), rise.values)
+        depth, height, width = self.values.shape
+        if not height * width:  # the volume has only one row or column
+            return
+        for k in range(0, depth, _PLANES):  # a field of the whole sample would double its memory
+            part = self.values[k : k + _PLANES]
+            part -= own.at(Box((k, 0, 0), (k + len(part), height, width)))
 
 
 def _to_the_ends(lattice: LatticeField, shape: tuple[int, ...]) -> LatticeField:

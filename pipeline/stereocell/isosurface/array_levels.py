@@ -1,6 +1,7 @@
 """Find the iso-levels of a volume that fits into memory, for a notebook or a script."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,6 +132,10 @@ def gather_array_evidence(
         voxels=voxels,
         spacing_um=spacing,
         counting=counting,
-        background=None if lattice is None else lattice.at(whole),
+        background=None if lattice is None else partial(_slices_of, lattice, whole),
     )
     return ArrayEvidence(counting, evidence, lattice, max_shift)
+
+
+def _slices_of(background: LatticeField, whole: Box, first: int, stop: int) -> NDArray[np.float32]:
+    return background.at(whole.slab(0, first, stop))

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.kernels.level_sums import sum_along_axes
+
 # Share of the variance along the axes; a channel with more shows light, not bodies
 MAX_LIGHT = 0.85
 # Sum of all rises and falls from slice to slice over the range; up to this, values count as only
@@ -42,24 +44,29 @@ class Profiles:
 
     @classmethod
     def of(
-        cls, field: NDArray[np.float32], kept: NDArray[np.bool_], start: tuple[int, int, int]
+        cls,
+        field: NDArray[np.float32],
+        padding: NDArray[np.bool_],
+        own: tuple[slice, slice, slice],
+        start: tuple[int, int, int],
     ) -> "Profiles":
-        """Return a tile's profiles over those voxels of `field` that are `kept` (bool).
+        """Return a tile's profiles over the voxels that are not padding.
 
-        field  (slice, row, column); `kept` has the same shape
-        start  index (slice, row, column) of the tile's first voxel in the dataset
+        field    (slice, row, column), a window around the tile
+        padding  bool, the same window
+        own      the tile within the window
+        start    index (slice, row, column) of the tile's first voxel in the dataset
         """
-        are_all = bool(kept.all())
-        values = np.ascontiguousarray(field) if are_all else np.where(kept, field, np.float32(0))
-        sz, sy, sx = (values.sum(axis=axes, dtype=np.float64) for axes in _ACROSS)
-        nz, ny, nx = (
-            np.full(n, kept.size // max(n, 1)) if are_all else kept.sum(axis=axes, dtype=np.int64)
-            for n, axes in zip(kept.shape, _ACROSS, strict=True)
-        )
+        box = np.array([[part.start, part.stop] for part in own], np.int64)
+        sz, sy, sx, nz, ny, nx = sum_along_axes(field, padding, box)
         return cls(start, (sz, sy, sx), (nz, ny, nx))
 
-
-_ACROSS = ((1, 2), (0, 2), (0, 1))
+    def followed_by(self, other: "Profiles") -> "Profiles":
+        """Return the profiles of a tile from those of its first slices and of all others."""
+        (sz, sy, sx), (nz, ny, nx) = self.sums, self.counts
+        sums = np.concatenate([sz, other.sums[0]]), sy + other.sums[1], sx + other.sums[2]
+        counts = np.concatenate([nz, other.counts[0]]), ny + other.counts[1], nx + other.counts[2]
+        return Profiles(self.start, sums, counts)
 
 
 def share_of_light(

@@ -13,9 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.isosurface.holder import Holder
+from stereocell.kernels.solid_counts import count_inside
 from stereocell.model.lattice import Lattice, Step
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.unit import Cover
+
+_PLANES = 16  # planes that are compared at once
 
 
 def measure_cover(
@@ -37,40 +40,39 @@ def measure_cover(
     background  voxel values; None: none was subtracted
     holder      pieces that are left out of the surface, and so of the count; None: nothing is
     """
-    own = tuple(
-        slice(a - low, b - low)
-        for a, b, low in zip(lattice.own.start, lattice.own.stop, lattice.window.start, strict=True)
-    )
-    level = iso.at(lattice.window)
-    if background is not None:
-        level = level + background.at(lattice.window)
-    is_above = (voxels > level)[own]
-    if holder is not None:
-        is_above &= ~np.broadcast_to(holder.at(lattice.window), voxels.shape)[own]
-    is_inside = between_planes(distance, lattice, step) > 0
-    source, solid = int(is_above.sum()), int(is_inside.sum())
-    return Cover(source, int((is_above & is_inside).sum()), solid)
+    places = [_between_planes(distance.shape, lattice, step, axis) for axis in range(3)]
+    in_plane = places[1:]
+    source = solid = covered = 0
+    own = lattice.own
+    for z in range(own.start[0], own.stop[0], _PLANES):
+        slab = own.slab(0, z, min(z + _PLANES, own.stop[0]))
+        level = iso.at(slab)
+        if background is not None:
+            level = level + background.at(slab)
+        is_above = voxels[slab.slices_in(lattice.window)] > level
+        if holder is not None:
+            is_above &= ~holder.at(slab)
+        along_z = [part[z - own.start[0] : slab.stop[0] - own.start[0]] for part in places[0]]
+        low, high, share = (np.concatenate(parts) for parts in zip(along_z, *in_plane, strict=True))
+        inside, both = count_inside(distance, is_above, low, high, share)
+        source, solid, covered = source + int(is_above.sum()), solid + inside, covered + both
+    return Cover(source, covered, solid)
 
 
-def between_planes(field: NDArray[np.float32], lattice: Lattice, step: Step) -> NDArray[np.float32]:
-    """Return a field of the thinned lattice's window at all of the tile's own points.
+def _between_planes(
+    shape: tuple[int, ...], lattice: Lattice, step: Step, axis: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+    """Return between which planes of the thinned lattice's window the tile's own points lie.
 
-    The field is linear between two planes of the thinned lattice, and constant beyond the last one.
+    The result is the plane before each point, the plane behind it, and the share of the way between
+    them, 0..1. Past the last plane both are the last one.
     """
-    first = lattice.thinned(step).window.start
-    for axis in range(3):
-        if step[axis] == 1:
-            start = lattice.own.start[axis] - lattice.window.start[axis]
-            stop = lattice.own.stop[axis] - lattice.window.start[axis]
-            field = field[(slice(None),) * axis + (slice(start, stop),)]
-            continue
-        points = np.arange(lattice.own.start[axis], lattice.own.stop[axis])
-        planes, past = np.divmod(points - lattice.region.start[axis], step[axis])
-        last = field.shape[axis] - 1
-        low = np.clip(planes - first[axis], 0, last)
-        below = np.take(field, low, axis)
-        shape = [-1 if axis == k else 1 for k in range(3)]
-        share = (past / step[axis]).astype(np.float32).reshape(shape)
-        below += (np.take(field, np.minimum(low + 1, last), axis) - below) * share
-        field = below
-    return field
+    every, last = step[axis], shape[axis] - 1
+    points = np.arange(lattice.own.start[axis], lattice.own.stop[axis])
+    first = lattice.window.start[axis]
+    if every > 1:
+        points -= lattice.region.start[axis]
+        first = lattice.thinned(step).window.start[axis]
+    planes, past = np.divmod(points, every)
+    low = np.clip(planes - first, 0, last)
+    return low, np.minimum(low + 1, last), (past / every).astype(np.float32)

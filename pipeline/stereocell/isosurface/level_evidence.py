@@ -3,6 +3,7 @@
 Every number is a sum over voxels, so the sums of all tiles are those of the dataset in any cut.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
@@ -28,8 +29,11 @@ LAG = 4
 HALO = (1, 1, LAG)  # voxels (slice, row, column) around a tile that its evidence reads
 NOISE_BINS = 1024
 _PLANES = 16  # number of planes that are counted together
-_FINITE = 255 << 6  # upper 15 bits of the first float32 that is not finite
+_FINITE = 255 << 7  # upper 16 bits of the first float32 that is not finite
 Slices = tuple[slice, slice, slice]
+# Returns the background, float32 (slice, row, column), of a window's slices from one to another. It
+# broadcasts over them.
+Ground = Callable[[int, int], NDArray[np.float32]]
 _NOISE_LEAST = 1e-6  # share of the scale's range: end of the first bin of differences
 
 
@@ -74,13 +78,26 @@ class TileEvidence:
     neighbours: Neighbours | None = None
     edges: tuple[EdgeSums, EdgeSums | None] | None = None
 
-    def __add__(self, other: "TileEvidence") -> "TileEvidence":
-        both = None if self.above is None or other.above is None else self.above + other.above
+    def followed_by(self, other: "TileEvidence") -> "TileEvidence":
+        """Return a tile's evidence from that of its first slices and of all others.
+
+        Edges are left out.
+        """
+        assert self.profiles is not None
+        assert other.profiles is not None
+        assert self.neighbours is not None
+        assert other.neighbours is not None
+        (first, above), (next_one, next_above) = self.profiles, other.profiles
         return TileEvidence(
             self.plain + other.plain,
             self.padding + other.padding,
-            both,
+            self.above + other.above if self.above and other.above else None,
             self.differences + other.differences,
+            (
+                first.followed_by(next_one),
+                above.followed_by(next_above) if above and next_above else None,
+            ),
+            self.neighbours + other.neighbours,
         )
 
 
@@ -128,7 +145,7 @@ def find_padding(
         return dark
     size = (1, *(min(2 * r + 1, n) for r, n in zip(reach[1:], voxels.shape[1:], strict=True)))
     # At the end of a row a run of half the size is enough
-    if not _has_run(dark, (size[2] + 1) // 2):
+    if not any(_has_run(plane, (size[2] + 1) // 2) for plane in dark):
         return np.zeros(voxels.shape, bool)
     flat = ndimage.minimum_filter(dark.view(np.uint8), size, mode="nearest")
     if not flat.any():
@@ -140,11 +157,11 @@ def find_padding(
 
 
 def _has_run(flags: NDArray[np.bool_], length: int) -> bool:
-    """Return whether `length` flags are set side by side along a row (the last axis)."""
+    """Return whether `length` flags (row, column) are set side by side along a row."""
     known = 1
     while known < length and flags.any():
         onward = min(known, length - known)
-        flags, known = flags[..., :-onward] & flags[..., onward:], known + onward
+        flags, known = flags[:, :-onward] & flags[:, onward:], known + onward
     return bool(flags.any())
 
 
@@ -157,7 +174,7 @@ def gather_evidence(
     spacing_um: Spacing,
     counting: Counting,
     start: tuple[int, int, int] = (0, 0, 0),
-    background: NDArray[np.float32] | None = None,
+    background: Ground | None = None,
     criterion: Criterion | None = None,
 ) -> TileEvidence:
     """Return a tile's evidence.
@@ -172,58 +189,69 @@ def gather_evidence(
     spacing_um   of the three axes
     counting     scales of the channel
     start        index (slice, row, column) of the tile's first voxel in the dataset
-    background   float32, broadcasts over the window, voxel values; None: no background is tried
+    background   of the window's slices, voxel values; None: no background is tried
     criterion    the criterion that scores edges; None: levels follow from histograms
 
     With the halo, the sums over all tiles are those of the dataset, however it is cut.
     """
-    if background is not None:
-        background = np.broadcast_to(background, field.shape)
     parts = []
-    first, stop = own[0].start, own[0].stop
-    # Limits the memory: copies of the whole would be five times the field
-    for z in range(first, stop, _PLANES):
-        low = max(z - HALO[0], 0)
-        part = slice(low, min(z + _PLANES + HALO[0], len(field)))
-        inner = (slice(z - low, min(z + _PLANES, stop) - low), *own[1:])
-        under = None if background is None else background[part]
-        parts.append(_gather(field[part], padding[part], inner, spacing_um, counting, under))
-    kept = ~padding[own]
-    raised = None
-    if background is not None and counting.scale_above is not None:
-        raised = Profiles.of(field[own] - background[own], kept, start)
-    profiles = Profiles.of(field[own], kept, start), raised
-    scale = counting.scale.low, counting.scale.middle, counting.scale.high
-    found = replace(
-        reduce(TileEvidence.__add__, parts),
-        profiles=profiles,
-        neighbours=Neighbours.of(voxels, padding, own, scale),
-    )
+    z0, z1 = own[0].start, own[0].stop
+    # Limits the memory: the field above the background is as large as the field
+    for z in range(z0, z1, _PLANES):
+        low, high = max(z - HALO[0], 0), min(z + _PLANES + HALO[0], len(field))
+        inner = (slice(z - low, min(z + _PLANES, z1) - low), *own[1:])
+        raised = None
+        if background is not None and counting.scale_above is not None:
+            raised = field[low:high] - background(low, high)
+        window = _Window(field[low:high], raised, padding[low:high], voxels[low:high])
+        at = (start[0] + z - z0, *start[1:])
+        parts.append(_gather(window, inner, spacing_um, counting, at))
+    found = reduce(TileEvidence.followed_by, parts)
     if criterion is None:
         return found
     edges = _edges(field, padding, own, spacing_um, counting.scale, criterion)
     above = None
     if background is not None and counting.scale_above is not None:
-        above = _edges(
-            field - background, padding, own, spacing_um, counting.scale_above, criterion
-        )
+        raised = field - background(0, len(field))
+        above = _edges(raised, padding, own, spacing_um, counting.scale_above, criterion)
     return replace(found, edges=(edges, above))
 
 
+@dataclass(frozen=True, slots=True)
+class _Window:
+    """A window around some slices of a tile. All arrays have the same shape.
+
+    raised  the field above the background; None: no background is tried
+    """
+
+    field: NDArray[np.float32]
+    raised: NDArray[np.float32] | None
+    padding: NDArray[np.bool_]
+    voxels: NDArray[Any]
+
+
 def _gather(
-    field: NDArray[np.float32],
-    padding: NDArray[np.bool_],
+    window: _Window,
     own: Slices,
     spacing_um: Spacing,
     counting: Counting,
-    background: NDArray[np.float32] | None,
+    start: tuple[int, int, int],
 ) -> TileEvidence:
-    above = None
-    if background is not None and counting.scale_above is not None:
-        raised = field - background
-        above, _ = _binned(raised, padding, own, spacing_um, counting.scale_above)
-    plain, out = _binned(field, padding, own, spacing_um, counting.scale)
-    return TileEvidence(plain, out, above, _differences(field, padding, own, counting.scale))
+    field, padding, scale = window.field, window.padding, counting.scale
+    plain, out = _binned(field, padding, own, spacing_um, scale)
+    above = along = None
+    if window.raised is not None and counting.scale_above is not None:
+        above, _ = _binned(window.raised, padding, own, spacing_um, counting.scale_above)
+        along = Profiles.of(window.raised, padding, own, start)
+    ends = scale.low, scale.middle, scale.high
+    return TileEvidence(
+        plain,
+        out,
+        above,
+        _differences(field, padding, own, scale),
+        (Profiles.of(field, padding, own, start), along),
+        Neighbours.of(window.voxels, padding, own, ends),
+    )
 
 
 def _edges(
@@ -272,8 +300,8 @@ def _differences(
     field: NDArray[np.float32], padding: NDArray[np.bool_], own: Slices, scale: Scale
 ) -> NDArray[np.int64]:
     edges = noise_edges(scale)
-    least = (np.arange(_FINITE, dtype=np.uint32) << 17).view(np.float32).astype(np.float64)
-    first = np.full(1 << 15, NOISE_BINS - 1, np.int16)
+    least = (np.arange(_FINITE, dtype=np.uint32) << 16).view(np.float32).astype(np.float64)
+    first = np.full(1 << 16, NOISE_BINS - 1, np.int16)
     first[:_FINITE] = np.clip(np.searchsorted(edges, least, "right") - 1, 0, NOISE_BINS - 1)
     return count_differences(field, padding, _box_of(own), LAG, first, edges)
 

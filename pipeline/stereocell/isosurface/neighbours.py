@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.kernels.level_sums import sum_neighbours
+
 MIN_CORRELATION = 0.01  # correlation of neighbours; a channel below it holds only noise
 _Slices = tuple[slice, slice, slice]
 
@@ -45,23 +47,17 @@ class Neighbours:
         own      the tile within the window
         scale    least, middle and largest value; hot voxels beyond the ends are clipped
         """
-        low, middle, high = scale
-        single, pairs = np.zeros(3), np.zeros((2, 2))
         z_range, rows, columns = own
+        sums = np.zeros((7, columns.stop - columns.start))
+        place = np.array([[rows.start, rows.stop], [columns.start, columns.stop]], np.int64)
         for z in range(z_range.start, z_range.stop):
-            plane = np.clip(voxels[z].astype(np.float64), low, high) - middle
-            kept = ~padding[z]
-            plane[~kept] = 0.0
-            inner, is_kept = plane[rows, columns], kept[rows, columns]
-            single += (is_kept.sum(), inner.sum(), np.square(inner).sum())
-            for axis in range(2):
-                ahead = [rows, columns]
-                ahead[axis] = slice(ahead[axis].start + 1, ahead[axis].stop + 1)
-                there, is_there = plane[tuple(ahead)], kept[tuple(ahead)]
-                height, width = there.shape
-                both = is_kept[:height, :width] & is_there
-                pairs[axis] += (both.sum(), (inner[:height, :width] * there)[both].sum())
-        return cls(single, pairs)
+            plane = np.ascontiguousarray(voxels[z], np.float64)
+            sum_neighbours(plane, np.ascontiguousarray(padding[z]), place, np.array(scale), sums)
+        every = sums.sum(axis=1)
+        return cls(every[:3], every[3:].reshape(2, 2))
+
+    def __add__(self, other: "Neighbours") -> "Neighbours":
+        return Neighbours(self.voxels + other.voxels, self.pairs + other.pairs)
 
 
 def neighbour_correlation(tiles: Sequence[Neighbours]) -> float:

@@ -43,14 +43,21 @@ from stereocell.kernels.interfaces import (
     slope_volumes,
     smooth_interfaces,
 )
-from stereocell.kernels.level_sums import count_differences, sum_by_value
+from stereocell.kernels.level_sums import (
+    count_differences,
+    sum_along_axes,
+    sum_by_value,
+    sum_neighbours,
+)
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.nearest import find_nearest, find_sides
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
+from stereocell.kernels.solid_counts import count_inside
 from stereocell.kernels.union_find import label_pairs
+from stereocell.kernels.value_counts import count_values
 from stereocell.kernels.visibility import cast_rays
 from stereocell.kernels.xxhash import xxh32
 
@@ -137,9 +144,14 @@ def compile_others() -> None:
     measure_slopes(voxels, steps)
     divide_by_slopes(voxels, steps, 1e-6, 2.0)
     mask, every = voxels > 0, np.array([[0, 3]] * 3, np.int64)
-    one_bin, small = np.zeros(1 << 15, np.int16), np.float32(0.1)
+    one_bin, small = np.zeros(1 << 16, np.int16), np.float32(0.1)
     sum_by_value(voxels, mask, every, steps, one_bin, small, small, small, 1)
     count_differences(voxels, mask, every, 1, one_bin, steps)
+    sum_along_axes(voxels, mask, every)
+    count_values(steps, np.arange(2.0), 0.0, 1.0, True, np.zeros(1, np.int64))
+    ones = np.ones(9, np.int64)
+    count_inside(voxels, mask, ones, ones, ones.astype(np.float32))
+    sum_neighbours(np.zeros((3, 3)), mask[0], every[1:], steps, np.zeros((7, 3)))
     move_off_zero(voxels, np.float32(0.01))
     close_gaps(voxels, steps, 1.0, 1.0)
     first_run, start, stop = find_runs(mask)

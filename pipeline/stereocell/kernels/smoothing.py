@@ -94,6 +94,24 @@ def _clip_hot_voxels(plane: Field, out: Field, least: Planes, most: Planes) -> N
 
 
 @part
+def _add_pairs(total: Weights, weight: float, first: Row, second: Row) -> None:
+    """Add to a row the sums of two other rows, times a weight."""
+    for x in range(len(total)):
+        total[x] += weight * (np.float64(first[x]) + np.float64(second[x]))
+
+
+@part
+def _add_two_pairs(
+    total: Weights, weights: Weights, first: Row, second: Row, third: Row, fourth: Row
+) -> None:
+    """Call `_add_pairs` for two pairs of rows. One loop reads and writes the totals only once."""
+    near, far = weights[0], weights[1]
+    for x in range(len(total)):
+        sums = total[x] + near * (np.float64(first[x]) + np.float64(second[x]))
+        total[x] = sums + far * (np.float64(third[x]) + np.float64(fourth[x]))
+
+
+@part
 def _smooth_plane(
     plane: Field, out: Field, along_y: Weights, along_x: Weights, total: Weights, wide: Field
 ) -> None:
@@ -106,11 +124,13 @@ def _smooth_plane(
     for y in range(height):
         for x in range(width):
             total[x] = along_y[ry] * plane[y, x]
-        for j in range(1, ry + 1):
-            weight = along_y[ry + j]
+        for j in range(1, ry, 2):
             above, below = plane[max(y - j, 0)], plane[min(y + j, height - 1)]
-            for x in range(width):
-                total[x] += weight * (np.float64(above[x]) + np.float64(below[x]))
+            before, behind = plane[max(y - j - 1, 0)], plane[min(y + j + 1, height - 1)]
+            _add_two_pairs(total, along_y[ry + j :], above, below, before, behind)
+        if ry % 2:
+            above, below = plane[max(y - ry, 0)], plane[min(y + ry, height - 1)]
+            _add_pairs(total, along_y[2 * ry], above, below)
         for x in range(rx):
             wide[x] = total[0]
             wide[rx + width + x] = total[width - 1]
@@ -118,10 +138,11 @@ def _smooth_plane(
             wide[rx + x] = total[x]
         for x in range(width):
             total[x] = along_x[rx] * wide[rx + x]
-        for j in range(1, rx + 1):
-            weight = along_x[rx + j]
-            for x in range(width):
-                total[x] += weight * (np.float64(wide[rx + x - j]) + np.float64(wide[rx + x + j]))
+        for j in range(1, rx, 2):
+            left, right, at = wide[rx - j :], wide[rx + j :], along_x[rx + j :]
+            _add_two_pairs(total, at, left, right, wide[rx - j - 1 :], wide[rx + j + 1 :])
+        if rx % 2:
+            _add_pairs(total, along_x[2 * rx], wide, wide[2 * rx :])
         row = out[y]
         for x in range(width):
             row[x] = total[x]
@@ -183,12 +204,16 @@ def smooth_in_place(
             middle = ring[done % len(ring), y]
             for x in range(width):
                 total[x] = along_z[rz] * middle[x]
-            for j in range(1, rz + 1):
-                weight = along_z[rz + j]
+            for j in range(1, rz, 2):
                 above = ring[max(done - j, 0) % len(ring), y]
                 below = ring[min(done + j, depth - 1) % len(ring), y]
-                for x in range(width):
-                    total[x] += weight * (np.float64(above[x]) + np.float64(below[x]))
+                before = ring[max(done - j - 1, 0) % len(ring), y]
+                behind = ring[min(done + j + 1, depth - 1) % len(ring), y]
+                _add_two_pairs(total, along_z[rz + j :], above, below, before, behind)
+            if rz % 2:
+                above = ring[max(done - rz, 0) % len(ring), y]
+                below = ring[min(done + rz, depth - 1) % len(ring), y]
+                _add_pairs(total, along_z[2 * rz], above, below)
             row = field[done, y]
             for x in range(width):
                 row[x] = total[x]

@@ -26,7 +26,7 @@ from stereocell.model.tiling import Box
 from stereocell.read import Dataset
 from stereocell.steps.open_source import Voxels, open_source
 from stereocell.steps.units_again import AGAIN
-from stereocell.transfer.adaptive_threshold import Histogram, make_histogram
+from stereocell.transfer.adaptive_threshold import make_histogram
 from stereocell.transfer.boundaries import SuggestedShapes, suggest
 from stereocell.transfer.channel_statistics import ChannelStatistics, find_statistics
 from stereocell.transfer.joint_histogram import (
@@ -41,11 +41,10 @@ from stereocell.transfer.joint_histogram import (
 from stereocell.transfer.options import WindowOptions
 
 SURVEY_VOXELS = 16_000_000  # about the most voxels from which a channel's window is found
-# Most voxels that are counted for the histogram. More voxels make a peak more certain. In a head of
-# 384 x 384 x 274 voxels the second-highest peak rose 6.5 deviations above chance with all voxels,
-# and 3.7 with every third plane.
+# Most voxels that are read at once and counted for the histogram. More voxels make a peak more
+# certain. In a head of 384 x 384 x 274 voxels the second-highest peak rose 6.5 deviations above
+# chance with all voxels, and 3.7 with every third plane.
 COUNTED_VOXELS = 64_000_000
-COUNTED_PLANES = 16  # planes that are read at once
 JOINT_VOXELS = 8_000_000  # most voxels at full resolution from which boundaries are found
 
 
@@ -95,7 +94,7 @@ class FindWindow(Step[Window]):
     window         display window in voxel values, if the settings state it; None: it is found
     """
 
-    VERSION: ClassVar[int] = 1
+    VERSION: ClassVar[int] = 2
     FORM: ClassVar[Document[Window]] = WINDOW
 
     voxels: Voxels
@@ -156,42 +155,38 @@ def _measure(task: FindWindow) -> Window:
     scale_above = None if background is None else scale.above(background)
     del padding
     statistics = find_statistics(voxels, task.options, background=background, window=task.window)
-    if (
-        voxels.shape != task.region.shape
-        and _voxels(task, dataset, task.voxels.level) <= COUNTED_VOXELS
-    ):
-        statistics = replace(statistics, values=_count_values(task, statistics.window))
-    suggested, noise = _look_closely(task, dataset, statistics.window, least)
+    is_whole = voxels.shape == task.region.shape
+    del voxels
+    built = None
+    if not is_whole and _voxels(task, dataset, task.voxels.level) <= COUNTED_VOXELS:
+        built = task.voxels.read(task.region).voxels
+        statistics = replace(statistics, values=make_histogram(built, statistics.window))
+    suggested, noise = _look_closely(task, dataset, built, window=statistics.window, darkest=least)
     statistics = replace(statistics, suggested=suggested)
     shift = find_max_shift(noise, task.max_shift, mask) if task.max_shift > 0 else None
     return Window(statistics, Counting(scale, scale_above, darkest, mask), holder, shift)
 
 
-def _count_values(task: FindWindow, window: tuple[float, float]) -> Histogram:
-    """Return the histogram of all voxels of the region within a window (low, high)."""
-    (z0, *start), (z1, *stop) = task.region.start, task.region.stop
-    counts: list[NDArray[np.int64]] = []
-    for z in range(z0, z1, COUNTED_PLANES):
-        box = Box((z, start[0], start[1]), (min(z + COUNTED_PLANES, z1), stop[0], stop[1]))
-        part = make_histogram(task.voxels.read(box).voxels, window)
-        counts.append(np.array(part.counts))
-    return replace(part, counts=tuple(int(n) for n in np.sum(counts, axis=0)))
-
-
 def _look_closely(
-    task: FindWindow, dataset: Dataset, window: tuple[float, float], darkest: float | None
+    task: FindWindow,
+    dataset: Dataset,
+    built: NDArray[Any] | None,
+    *,
+    window: tuple[float, float],
+    darkest: float | None,
 ) -> tuple[SuggestedShapes, float]:
     """Return a suggested 2D function and the noise's deviation.
 
     They come from blocks of the level that is built, because coarser levels have softer edges and
     less noise.
 
+    built    the region's voxels (z, y, x) if they were read; None: the blocks are read
     darkest  value of padding, in which no noise can be measured; None: there is no padding
     """
     axis = dataset.slice_axis(task.voxels.level)
     spacing = first_of_three(dataset.levels[task.voxels.level].spacing_um, axis)
     fine, noise = np.zeros((FINE_ROWS, COLUMNS), np.int64), NoiseSample()
-    for voxels in _blocks(task, dataset):
+    for voxels in _blocks(task, dataset, built):
         turned = np.ascontiguousarray(slices_first(voxels, axis))
         noise.add(turned, darkest)
         fine += count_joint(
@@ -203,12 +198,21 @@ def _look_closely(
     return suggest(fine, spacing_um=spacing), noise.deviation()
 
 
-def _blocks(task: FindWindow, dataset: Dataset) -> Iterator[NDArray[Any]]:
-    """Yield blocks (z, y, x) of the level that is built, spread over the region."""
+def _blocks(
+    task: FindWindow, dataset: Dataset, built: NDArray[Any] | None = None
+) -> Iterator[NDArray[Any]]:
+    """Yield blocks (z, y, x) of the level that is built, spread over the region.
+
+    built  the region's voxels (z, y, x) if they were read; None: the blocks are read
+    """
     largest = back_of_three(SAMPLE_EDGE, dataset.slice_axis(task.voxels.level))
     for box in sample_boxes(task.region, JOINT_VOXELS, largest):
         around = box.grown((1, 1, 1), task.region)
-        yield task.voxels.read(around).voxels
+        yield (
+            task.voxels.read(around).voxels
+            if built is None
+            else built[around.slices_in(task.region)]
+        )
 
 
 def _mask_of(blocks: Iterable[NDArray[Any]]) -> tuple[float, float] | None:

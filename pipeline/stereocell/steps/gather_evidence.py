@@ -38,9 +38,14 @@ def evidence_of(task: "GatherEvidence", volume: Volume, window: Box) -> TileEvid
     reach = denoising_reach(task.smoothing_um, spacing, axis)
     own = task.box.slices_in(window)
     voxels = slices_first(volume.voxels, axis)
-    background = None
-    if task.background is not None:
-        background = slices_first(task.background.at(window), axis)
+
+    def background(first: int, stop: int) -> NDArray[np.float32]:
+        assert task.background is not None
+        start = window.start[axis]
+        return slices_first(
+            task.background.at(window.slab(axis, start + first, start + stop)), axis
+        )
+
     return gather_evidence(
         np.ascontiguousarray(slices_first(denoise(volume, task.smoothing_um), axis)),
         find_padding(voxels, task.counting.darkest, first_of_three(reach, axis)),
@@ -49,7 +54,7 @@ def evidence_of(task: "GatherEvidence", volume: Volume, window: Box) -> TileEvid
         spacing_um=first_of_three(spacing, axis),
         counting=task.counting,
         start=first_of_three(task.box.start, axis),
-        background=background,
+        background=None if task.background is None else background,
         criterion=CRITERIA.get(task.criterion),
     )
 
@@ -150,7 +155,7 @@ class GatherEvidence(Step[TileEvidence]):
     criterion   name of the criterion that scores edges; empty: none does
     """
 
-    VERSION: ClassVar[int] = 1
+    VERSION: ClassVar[int] = 2
     FORM: ClassVar[Document[TileEvidence]] = Document(
         "units.schema.json#Evidence", evidence_to_json, evidence_from_json, AGAIN
     )

@@ -40,10 +40,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.kernels.value_counts import count_values
+
 WINDOW_SHARE = 0.10  # length of the moving window as a share of the histogram's length
 CHANCE = 5.0  # standard deviations by which a peak must rise above its saddle
 BINS = 256  # largest number of bins of a histogram
-_AT_ONCE = 1 << 20  # number of voxels that are counted together
+_AT_ONCE = 1 << 16  # voxels that are counted together; as float64 they fit into a processor's cache
 Reading = Literal["two peaks", "no peak before", "single peak"]
 
 
@@ -107,14 +109,26 @@ def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogr
         width = max(1.0, np.ceil((last - first + 1) / BINS))
         bins = max(1, int(np.ceil((last - first + 1) / width)))
         low, high = float(first - 0.5), float(first - 0.5 + bins * width)
-    # The voxels are counted in parts, because a mask of all of them, and a copy, take much memory.
-    flat, counts = voxels.reshape(-1), np.zeros(bins, np.int64)
-    for start in range(0, flat.size, _AT_ONCE):
-        part = flat[start : start + _AT_ONCE]
-        if part.dtype.kind in "iub":
-            part = part[(part >= first) & (part <= last)]
-        counts += np.histogram(part, bins, (low, high))[0]
+    counts = count_in_bins(voxels, np.linspace(low, high, bins + 1), window, clips=False)
     return Histogram(tuple(int(n) for n in counts), float(low), float(high))
+
+
+def count_in_bins(
+    voxels: NDArray[Any], edges: NDArray[np.float64], window: tuple[float, float], *, clips: bool
+) -> NDArray[np.int64]:
+    """Return the number of voxels in even bins, int64 (bins,).
+
+    voxels  any shape, any number type, voxel values
+    edges   ends of the bins, (bins + 1,), rising
+    window  lowest and highest value that is counted, within the edges
+    clips   whether voxels beyond the window are clipped to it; otherwise they are left out
+    """
+    flat, counts = voxels.reshape(-1), np.zeros(len(edges) - 1, np.int64)
+    low, high = (float(end) for end in window)
+    for start in range(0, flat.size, _AT_ONCE):
+        part = flat[start : start + _AT_ONCE].astype(np.float64)
+        count_values(part, edges, low, high, clips, counts)
+    return counts
 
 
 def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:

@@ -25,6 +25,7 @@ from stereocell.transfer import ct_colors, heat, mr_grey
 from stereocell.transfer.adaptive_threshold import (
     Histogram,
     Threshold,
+    count_in_bins,
     find_adaptive_threshold,
     make_histogram,
 )
@@ -36,7 +37,6 @@ from stereocell.transfer.shapes2d import fall_back
 
 BINS = 256
 BRIGHT_SHARE = 0.95  # share of an MR's tissue that is darker than the lightest grey
-_AT_ONCE = 1 << 20  # number of voxels that are counted together
 NO_SUGGESTION = SuggestedShapes(TransferFunctions2d(), "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 
@@ -93,13 +93,8 @@ def find_statistics(
         high = low + max(1.0, 1e-6 * abs(low))
     if window is not None:
         low, high = window
-    if voxels.dtype.kind == "f" and high - low < 1e-3 * max(abs(low), abs(high)):
-        voxels = voxels.astype(np.float64)  # float32 has no edges for such narrow bins
-    counts = np.zeros(BINS, np.int64)
-    # The voxels are counted in parts, because clipping turns each integer into eight bytes.
-    for start in range(0, voxels.size, _AT_ONCE):
-        part = np.clip(voxels[start : start + _AT_ONCE], low, high)
-        counts += np.histogram(part, BINS, (low, high))[0]
+    edges = np.linspace(low, high, BINS + 1)
+    counts = count_in_bins(voxels, edges, (low, high), clips=True)
     values = make_histogram(voxels, (low, high))
     return ChannelStatistics((low, high), tuple(int(n) for n in counts), background, values=values)
 
