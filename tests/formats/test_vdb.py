@@ -4,11 +4,12 @@ It walks the tree node by node, as tree/InternalNode.h and tree/LeafNode.h of Op
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from stereocell.formats.vdb import check_vdb, write_vdb
+from stereocell.formats.vdb import check_vdb, is_vdb_of, write_vdb
 from stereocell.formats.vdb_read import VdbValues
 from stereocell.model.errors import OutputError, StageError
 from support.vdb_reader import read_vdb, value_at
@@ -94,6 +95,73 @@ def test_the_error_for_a_file_cut_short_or_of_another_kind_is_one_line(tmp_path:
     path.unlink()
     with pytest.raises(StageError, match=r"a\.vdb: can't be read: No such file"):
         check_vdb(path)
+
+
+@pytest.fixture
+def volume() -> dict[str, Any]:
+    """Arguments of `write_vdb`: leaves that are full, empty, and cut off at the end."""
+    rng = np.random.default_rng(4)
+    measured = rng.integers(3, 900, (14, 22, 34)).astype(np.uint16)
+    measured[:, :12, :20] = 3
+    own = np.clip(measured[1:-1, 1:-1, 1:-1] // 4, 0, 255).astype(np.uint8)
+    places = {"first_um": (5.0, 7.0, 9.0), "spacing_um": SPACING_UM}
+    return {"density": own, "measured": measured, "apron": 1, **places}
+
+
+def test_a_file_is_found_equal_to_the_volume_that_it_was_written_from(
+    tmp_path: Path, volume: dict[str, Any]
+) -> None:
+    path = tmp_path / "a.vdb"
+    write_vdb(path, **volume)
+    assert is_vdb_of(path, **volume)
+    write_vdb(path, **{**volume, "measured": None})
+    assert is_vdb_of(path, **{**volume, "measured": None})
+    with pytest.raises(FileNotFoundError):
+        is_vdb_of(tmp_path / "b.vdb", **volume)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"measured": None},
+        {"first_um": (5.0, 7.0, 9.5)},
+        {"spacing_um": (0.28, 0.14, 0.16)},
+        {"apron": 2},
+    ],
+)
+def test_a_file_differs_from_a_volume_of_other_grids_or_places(
+    tmp_path: Path, volume: dict[str, Any], change: dict[str, Any]
+) -> None:
+    write_vdb(tmp_path / "a.vdb", **{**volume, **change})
+    assert not is_vdb_of(tmp_path / "a.vdb", **volume)
+
+
+@pytest.mark.parametrize("grid", ["density", "measured"])
+@pytest.mark.parametrize("place", [(0, 0, 0), (11, 19, 31), (5, 3, 4)])
+def test_a_file_differs_from_a_volume_with_one_other_voxel(
+    tmp_path: Path, volume: dict[str, Any], grid: str, place: tuple[int, int, int]
+) -> None:
+    write_vdb(tmp_path / "a.vdb", **volume)
+    other = volume[grid].copy()
+    other[place] += 1
+    assert not is_vdb_of(tmp_path / "a.vdb", **{**volume, grid: other})
+
+
+def test_a_file_with_any_damaged_byte_differs(tmp_path: Path, volume: dict[str, Any]) -> None:
+    path = tmp_path / "a.vdb"
+    write_vdb(path, **volume)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(0)
+    for place in [*range(80), *rng.integers(80, len(whole), 300).tolist()]:
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        assert not is_vdb_of(path, **volume), place
+    for size in (0, 64, 200, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:size])
+        assert not is_vdb_of(path, **volume), size
+    path.write_bytes(whole + b"\0")
+    assert not is_vdb_of(path, **volume)
 
 
 def write_measured(path: Path, measured: np.ndarray, shape: tuple[int, int, int]) -> None:

@@ -13,6 +13,7 @@ from stereocell.formats.gltf_decode import read_glb
 from stereocell.model.errors import CheckError
 from stereocell.model.mesh import Mesh
 from stereocell.verify.bundle_surfaces import _compare_faces
+from stereocell.verify.paired_surfaces import Surface, pair_surfaces
 
 
 @pytest.fixture
@@ -35,9 +36,11 @@ def _faults(stage: Mesh, bundle: Mesh, tmp_path: Path) -> list[str]:
         encode_glb(bundle, choose_step(2100), material=grey, name="fins", extras={}).data
     )
     drawn = read_glb(file)
-    there = stage.positions[stage.triangles].astype(np.float64) / 1e6
-    here = drawn.positions_m.astype(np.float64)[drawn.triangles]
-    return list(_compare_faces(there, here, stage.triangles, drawn, stage))
+    places, decoded = stage.positions / 1e6, drawn.positions_m.astype(np.float64)
+    pairs = pair_surfaces(
+        Surface(places, stage.triangles), Surface(decoded, drawn.triangles), drawn.step_m
+    )
+    return list(_compare_faces(places, decoded, pairs, drawn, stage))
 
 
 def test_rounded_normals_that_nearly_cancel_out_are_no_fault(fins: Mesh, tmp_path: Path) -> None:

@@ -24,22 +24,28 @@ measured  The background is the least value. Values are floats, which hold all n
           and .126; zstd in Blosc 1.53 and .057, which not every OpenVDB reads. A cyclic stain takes
           1.49 and .007.
 
-vdb_read.py reads files that are written here.
+vdb_tree.py has the grids' trees and heads. vdb_read.py reads files that are written here.
 """
 
 import hashlib
 import struct
-from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from imagecodecs import deflate_encode
+from imagecodecs import deflate_decode, deflate_encode
 from numcodecs import blosc
 from numpy.typing import NDArray
 
+from stereocell.formats.vdb_tree import (
+    ONLY_ACTIVE_VALUES,
+    Grid,
+    Leaves,
+    describe,
+    find_leaves,
+    make_transform,
+)
 from stereocell.model.errors import StageError
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.volume import zyx_to_xyz
@@ -51,31 +57,9 @@ MEASURED_NAME = "measured"
 MAGIC = 0x56444220
 _FORMAT, _LIBRARY = 224, (12, 0)
 OLDEST_FORMAT = 222  # first format with today's layout of the head
-TREE = "Tree_float_5_4_3"
-ZIP, ACTIVE_MASK, BLOSC = 1, 2, 4
-ONLY_ACTIVE_VALUES = b"\x00"
 _DEFLATE_LEVEL, _LZ4_LEVEL, _SHUFFLE = 1, 9, 1
-LEAF, NODE4, NODE5 = 8, 16, 32  # children along an edge: voxels, leaves, nodes of leaves
-_SIZE = struct.Struct("<q")
+_SIZE, _OFFSETS = struct.Struct("<q"), struct.Struct("<3q")
 _HEADER_BYTES = 65
-_HALF = (np.arange(256, dtype=np.float32) / 255).astype("<f2")
-
-_Leaves = tuple[NDArray[Any], NDArray[np.int64]]
-
-
-@dataclass(frozen=True, slots=True)
-class _Grid:
-    """A grid of an OpenVDB file that is to be written.
-
-    voxels  (x, y, z), the grid's numbers; uint8 if `is_half`
-    first   index (i, j, k) of the first voxel
-    """
-
-    name: str
-    voxels: NDArray[Any]
-    first: tuple[int, int, int]
-    background: Any
-    is_half: bool
 
 
 def write_vdb(
@@ -111,26 +95,145 @@ def write_vdb(
     >>> grid.name, grid.spacing.tolist(), grid.origin.tolist()
     ('density', [0.5, 0.5, 2.0], [0.0, -2.5, 0.0])
     """
+    grids, transform = _grids(density, first_um, spacing_um, measured, apron)
+    parts, at = [bytes(_HEADER_BYTES)], _HEADER_BYTES
+    for grid in grids:
+        leaves = find_leaves(grid)
+        descriptor, head = describe(grid, leaves, transform)
+        buffers = _buffers(grid, leaves)
+        end = at + len(descriptor) + _OFFSETS.size + len(head) + sum(map(len, buffers))
+        parts += [_placed(descriptor, head, at, end), *buffers]
+        at = end
+    content = bytearray().join(parts)
+    content[:_HEADER_BYTES] = _header(memoryview(content)[_HEADER_BYTES:], len(grids))
+    write_bytes(path, content)
+
+
+def is_vdb_of(
+    path: Path,
+    density: NDArray[np.uint8],
+    *,
+    first_um: Point,
+    spacing_um: Spacing,
+    measured: NDArray[Any] | None = None,
+    apron: int = 0,
+) -> bool:
+    """Return whether a file holds exactly what `write_vdb` writes for the same arguments.
+
+    Header, heads and trees are compared byte by byte. Values are decompressed and then compared,
+    which takes a third of the time of compressing them again. Raises OSError if the file can't be
+    read.
+    """
+    content = memoryview(path.read_bytes())
+    grids, transform = _grids(density, first_um, spacing_um, measured, apron)
+    at = _HEADER_BYTES
+    try:
+        for grid in grids:
+            leaves = find_leaves(grid)
+            descriptor, head = describe(grid, leaves, transform)
+            _, _, end = _OFFSETS.unpack_from(content, at + len(descriptor))
+            start = _placed(descriptor, head, at, end)
+            buffers = content[at + len(start) : end]
+            if bytes(content[at : at + len(start)]) != start or not _holds(buffers, grid, leaves):
+                return False
+            at = end
+    except (struct.error, RuntimeError, ValueError):  # a buffer is too short or damaged
+        return False
+    header = _header(content[_HEADER_BYTES:], len(grids))
+    return at == len(content) and bytes(content[:_HEADER_BYTES]) == header
+
+
+def _grids(
+    density: NDArray[np.uint8],
+    first_um: Point,
+    spacing_um: Spacing,
+    measured: NDArray[Any] | None,
+    apron: int,
+) -> tuple[list[Grid], bytes]:
+    """Return the grids of a file, and their transform."""
     rows, (depth, height, width) = density.shape[1], spacing_um
     lowest_um = (first_um[0], first_um[1] + (rows - 1) * height, first_um[2])
-    transform = _transform(zyx_to_xyz(lowest_um), np.array([width, height, depth]))
-    grids = [_Grid(GRID_NAME, _upwards(density), (0, 0, 0), 0, is_half=True)]
+    transform = make_transform(zyx_to_xyz(lowest_um), np.array([width, height, depth]))
+    grids = [Grid(GRID_NAME, density[:, ::-1], (0, 0, 0), 0, is_half=True)]
     if measured is not None:
         first = (-apron, rows + apron - measured.shape[1], -apron)
-        grids.append(_Grid(MEASURED_NAME, _upwards(measured), first, measured.min(), is_half=False))
-    body = b""
-    for grid in grids:
-        body += _encode(grid, transform, _HEADER_BYTES + len(body))
+        grids.append(Grid(MEASURED_NAME, measured[:, ::-1], first, measured.min(), is_half=False))
+    return grids, transform
+
+
+def _header(body: memoryview, grids: int) -> bytes:
+    """Return the header of a file with a number of grids. Its UUID is a hash of the body."""
     digest = hashlib.sha256(body).hexdigest().upper()
     cuts = (0, 8, 12, 16, 20, 32)
     uuid = "-".join(digest[a:b] for a, b in pairwise(cuts))
     header = struct.pack("<qIII?", MAGIC, _FORMAT, *_LIBRARY, True) + uuid.encode()
-    write_bytes(path, header + struct.pack("<Ii", 0, len(grids)) + body)
+    return header + struct.pack("<Ii", 0, grids)
 
 
-def _upwards(voxels: NDArray[Any]) -> NDArray[Any]:
-    """Return voxels (z, y, x), rows downwards, as (x, y, z), y upwards."""
-    return voxels[:, ::-1].transpose(2, 1, 0)
+def _placed(descriptor: bytes, head: bytes, at: int, end: int) -> bytes:
+    """Return a grid's descriptor and head, with offsets for a grid from `at` to `end`."""
+    grid_at = at + len(descriptor) + _OFFSETS.size
+    return descriptor + _OFFSETS.pack(grid_at, grid_at + len(head), end) + head
+
+
+def _buffers(grid: Grid, leaves: Leaves) -> list[bytes]:
+    """Return every leaf's mask and active values, in parts."""
+    pack = _pack_halves if grid.is_half else _pack_floats
+    width, values = leaves.values.itemsize, leaves.values.data
+    parts, start = [], 0
+    for mask, end in zip(_coded_masks(leaves), leaves.ends, strict=True):
+        numbers, size = values[start:end], width * (end - start)
+        packed = pack(numbers)
+        if len(packed) < size:
+            parts += [mask, _SIZE.pack(len(packed)), packed]
+        else:  # a negative size: the numbers are not compressed
+            parts += [mask, _SIZE.pack(-size), numbers.tobytes()]
+        start = end
+    return parts
+
+
+def _holds(buffers: memoryview, grid: Grid, leaves: Leaves) -> bool:
+    """Return whether buffers hold every leaf's mask and active values, and nothing else."""
+    unpack = _unpack_halves if grid.is_half else _unpack_floats
+    width, parts, start, at = leaves.values.itemsize, [], 0, 0
+    for mask, end in zip(_coded_masks(leaves), leaves.ends, strict=True):
+        (size,) = _SIZE.unpack_from(buffers, at + len(mask))
+        first = at + len(mask) + _SIZE.size
+        packed = buffers[first : first + abs(size)]
+        numbers = bytes(packed) if size < 0 else unpack(packed, width * (end - start))
+        if len(numbers) != width * (end - start) or bytes(buffers[at : at + len(mask)]) != mask:
+            return False
+        parts.append(numbers)
+        start, at = end, first + abs(size)
+    found = np.frombuffer(b"".join(parts), np.uint8)
+    return at == len(buffers) and np.array_equal(found, leaves.values.view(np.uint8))
+
+
+def _coded_masks(leaves: Leaves) -> list[bytes]:
+    """Return each leaf's mask, and the code of its values."""
+    coded = np.pad(leaves.masks, ((0, 0), (0, 1)), constant_values=ONLY_ACTIVE_VALUES[0])
+    coded_masks: list[bytes] = coded.view(f"V{coded.shape[1]}").ravel().tolist()
+    return coded_masks
+
+
+def _pack_halves(numbers: memoryview) -> bytes:
+    """Return half floats in the format of zlib."""
+    return bytes(deflate_encode(numbers.tobytes(), _DEFLATE_LEVEL))
+
+
+def _unpack_halves(packed: memoryview, size: int) -> bytes:
+    return bytes(deflate_decode(packed.tobytes(), out=size))
+
+
+def _pack_floats(numbers: memoryview) -> bytes:
+    """Return float32 numbers in a Blosc frame."""
+    return bytes(blosc.compress(numbers, b"lz4", _LZ4_LEVEL, _SHUFFLE))
+
+
+def _unpack_floats(packed: memoryview, size: int) -> bytes:
+    (stated,) = struct.unpack_from("<I", packed, 4)
+    # The size is checked before memory is allocated.
+    return bytes(blosc.decompress(packed)) if stated == size else b""
 
 
 def check_vdb(path: Path) -> None:
@@ -180,148 +283,3 @@ def _find_damage(file: BinaryIO, size: int) -> str | None:
 def _skip_text(file: BinaryIO) -> None:
     (length,) = struct.unpack("<I", file.read(4))
     file.seek(length, 1)
-
-
-def _encode(grid: _Grid, transform: bytes, at: int) -> bytes:
-    """Return one grid with its descriptor, for a position in the file."""
-    values, origins = _cut_leaves(grid)
-    active = values != grid.background
-    masks = np.packbits(active, axis=1, bitorder="little")
-    topology = _topology(grid, origins, masks)
-    buffers = _buffers(grid, values, active, masks)
-
-    first, last = _active_box(grid)
-    metadata = {
-        "class": ("string", b"fog volume" if grid.is_half else b"unknown"),
-        "file_bbox_max": ("vec3i", last),
-        "file_bbox_min": ("vec3i", first),
-        "file_compression": (
-            "string",
-            b"zip + active values" if grid.is_half else b"blosc + active values",
-        ),
-        "file_voxel_count": ("int64", struct.pack("<q", int(active.sum()))),
-        "name": ("string", grid.name.encode()),
-    }
-    if grid.is_half:
-        metadata["is_saved_as_half_float"] = ("bool", b"\x01")
-    tree = f"{TREE}_HalfFloat" if grid.is_half else TREE
-    descriptor = _string(grid.name) + _string(tree) + _string("")
-    flags = (ZIP if grid.is_half else BLOSC) | ACTIVE_MASK
-    head = struct.pack("<I", flags) + _metadata(dict(sorted(metadata.items()))) + transform
-    grid_at = at + len(descriptor) + 24
-    blocks_at = grid_at + len(head) + len(topology)
-    offsets = struct.pack("<3q", grid_at, blocks_at, blocks_at + len(buffers))
-    return b"".join([descriptor, offsets, head, topology, buffers])
-
-
-def _cut_leaves(grid: _Grid) -> _Leaves:
-    """Return the non-empty leaves (n, 512) and their origins (n, 3) in leaves, in tree order."""
-    before = [first % LEAF for first in grid.first]
-    shape = [-(-(a + n) // LEAF) for a, n in zip(before, grid.voxels.shape, strict=True)]
-    # Voxels are copied along their rows, in the order of memory with x innermost.
-    padded = np.full([n * LEAF for n in shape[::-1]], grid.background, grid.voxels.dtype).T
-    inner = tuple(slice(a, a + n) for a, n in zip(before, grid.voxels.shape, strict=True))
-    padded[inner] = grid.voxels
-    blocks = padded.reshape(shape[0], LEAF, shape[1], LEAF, shape[2], LEAF)
-    values = blocks.transpose(0, 2, 4, 1, 3, 5).reshape(-1, LEAF**3)
-    corner = np.array(grid.first) // LEAF
-    origins = np.indices(shape).reshape(3, -1).T.astype(np.int64) + corner
-    kept = (values != grid.background).any(axis=1)
-    values, origins = values[kept], origins[kept]
-    node4, node5 = origins // NODE4, origins // (NODE4 * NODE5)
-    levels = (node5, node4, origins)  # within a node, x outranks y, and y outranks z
-    order = np.lexsort([level[:, axis] for level in reversed(levels) for axis in (2, 1, 0)])
-    return values[order], origins[order]
-
-
-def _topology(grid: _Grid, origins: NDArray[np.int64], masks: NDArray[np.uint8]) -> bytes:
-    """Return the tree without the values of its leaves."""
-    # A grid of floats states the length of the values of a node even if it has no values.
-    nothing = b"" if grid.is_half else bytes(8)
-    roots = _runs(origins // (NODE4 * NODE5))
-    parts = [struct.pack("<ifII", 1, float(grid.background), 0, len(roots))]
-    for start, stop in roots:
-        root = origins[start] // (NODE4 * NODE5)
-        inside = origins[start:stop] - root * (NODE4 * NODE5)
-        corner = [int(v) for v in root * (LEAF * NODE4 * NODE5)]
-        parts += [struct.pack("<3i", *corner), _internal_node(inside // NODE4, NODE5), nothing]
-        for low, high in _runs(inside // NODE4):
-            node = _internal_node(inside[low:high] % NODE4, NODE4)
-            parts += [node, nothing, masks[start + low : start + high].tobytes()]
-    return b"".join(parts)
-
-
-def _runs(keys: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """Return the half-open ranges of equal rows; equal rows are neighbours."""
-    if len(keys) == 0:
-        return []
-    cuts = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
-    edges = [0, *(int(cut) for cut in cuts), len(keys)]
-    return list(pairwise(edges))
-
-
-def _internal_node(children: NDArray[np.int64], edge: int) -> bytes:
-    """Return a node; each slot without a child is inactive background."""
-    bits = np.zeros((edge, edge, edge), dtype=bool)
-    bits[tuple(children.T)] = True
-    mask = np.packbits(bits.ravel(), bitorder="little").tobytes()
-    return mask + bytes(len(mask)) + ONLY_ACTIVE_VALUES
-
-
-def _buffers(
-    grid: _Grid, values: NDArray[Any], active: NDArray[np.bool_], masks: NDArray[np.uint8]
-) -> bytes:
-    """Return every leaf's mask and active values."""
-    kept = _HALF[values[active]] if grid.is_half else values[active].astype("<f4")
-    pack = _pack_halves if grid.is_half else _pack_floats
-    coded = np.pad(masks, ((0, 0), (0, 1)), constant_values=ONLY_ACTIVE_VALUES[0])
-    ends, parts, start = np.cumsum(np.count_nonzero(active, axis=1)).tolist(), [], 0
-    for mask, end in zip(coded.view(f"V{coded.shape[1]}").ravel().tolist(), ends, strict=True):
-        numbers = kept[start:end]
-        packed, size = pack(numbers), numbers.nbytes
-        if len(packed) < size:
-            parts += [mask, _SIZE.pack(len(packed)), packed]
-        else:  # a negative size: the numbers are not compressed
-            parts += [mask, _SIZE.pack(-size), numbers.tobytes()]
-        start = end
-    return b"".join(parts)
-
-
-def _pack_halves(numbers: NDArray[Any]) -> bytes:
-    """Return half floats in the format of zlib."""
-    return bytes(deflate_encode(numbers.tobytes(), _DEFLATE_LEVEL))
-
-
-def _pack_floats(numbers: NDArray[Any]) -> bytes:
-    """Return float32 numbers in a Blosc frame."""
-    return bytes(blosc.compress(numbers, b"lz4", _LZ4_LEVEL, _SHUFFLE))
-
-
-def _active_box(grid: _Grid) -> tuple[bytes, bytes]:
-    """Return the first and the last active index; OpenVDB's empty box (0, -1) if there is none."""
-    first, last = [], []
-    active = grid.voxels != grid.background
-    for axis in range(3):
-        hits = np.flatnonzero(active.any(axis=tuple(a for a in range(3) if a != axis)))
-        first.append(int(hits[0]) + grid.first[axis] if len(hits) else 0)
-        last.append(int(hits[-1]) + grid.first[axis] if len(hits) else -1)
-    return struct.pack("<3i", *first), struct.pack("<3i", *last)
-
-
-def _transform(offset: NDArray[np.float64], scale: NDArray[np.float64]) -> bytes:
-    """Return the map from index to world, with the inverse scales that OpenVDB also stores."""
-    uniform = bool(np.ptp(scale) == 0)
-    kind = "UniformScaleTranslateMap" if uniform else "ScaleTranslateMap"
-    numbers = [offset, scale, scale, 1 / scale, 1 / scale**2, 0.5 / scale]
-    return _string(kind) + np.concatenate(numbers).astype("<f8").tobytes()
-
-
-def _metadata(items: Mapping[str, tuple[str, bytes]]) -> bytes:
-    parts = [struct.pack("<I", len(items))]
-    for key, (kind, value) in items.items():
-        parts += [_string(key), _string(kind), struct.pack("<I", len(value)), value]
-    return b"".join(parts)
-
-
-def _string(text: str) -> bytes:
-    return struct.pack("<I", len(text)) + text.encode()

@@ -14,17 +14,16 @@ import numpy as np
 from numcodecs import blosc
 from numpy.typing import NDArray
 
-from stereocell.formats.vdb import (
+from stereocell.formats.vdb import OLDEST_FORMAT, check_vdb
+from stereocell.formats.vdb_tree import (
     ACTIVE_MASK,
     BLOSC,
-    LEAF,
     NODE4,
     NODE5,
-    OLDEST_FORMAT,
     ONLY_ACTIVE_VALUES,
     TREE,
-    check_vdb,
 )
+from stereocell.kernels.vdb_leaves import LEAF
 from stereocell.model.errors import StageError
 
 _MAPS = {"ScaleTranslateMap", "UniformScaleTranslateMap"}

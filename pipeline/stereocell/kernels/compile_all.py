@@ -58,6 +58,7 @@ from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.solid_counts import count_inside
 from stereocell.kernels.union_find import label_pairs
 from stereocell.kernels.value_counts import count_values
+from stereocell.kernels.vdb_leaves import VOXELS, cut_leaves
 from stereocell.kernels.visibility import cast_rays
 from stereocell.kernels.xxhash import xxh32
 
@@ -158,3 +159,11 @@ def compile_others() -> None:
     components, touching, count = join_runs(first_run, start, stop, 3, True)
     measure_components(first_run, start, stop, components, touching, count, (3, 3, 3))
     mark_runs(first_run, start, stop, components, np.ones(count, bool), mask)
+
+    fixed = {name: np.zeros((2, 2, 2), name)[:, ::-1] for name in ("u1", "u2")}
+    for array in fixed.values():
+        array.flags.writeable = False
+    corner, bits = np.zeros((1, 3), np.int64), np.zeros((1, VOXELS // 8), np.uint8)
+    halves, floats = np.zeros(VOXELS, np.uint16), np.zeros(VOXELS, np.float32)
+    cut_leaves(fixed["u1"], corner, np.zeros(256, np.uint16), np.uint16(0), bits, halves)
+    cut_leaves(fixed["u2"], corner, None, np.float32(0), bits, floats)

@@ -49,7 +49,7 @@ def replacing(path: Path) -> Iterator[Path]:
         raise OutputError(f"{path}: can't be written: {error.strerror or error}") from error
 
 
-def write_bytes(path: Path, content: bytes) -> None:
+def write_bytes(path: Path, content: bytes | bytearray) -> None:
     """Write a file completely or not at all. Raises OutputError."""
     with replacing(path) as temporary:
         temporary.write_bytes(content)

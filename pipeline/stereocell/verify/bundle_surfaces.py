@@ -1,9 +1,10 @@
 """Compare a tile's surfaces in a bundle with those of the stage.
 
 Every vertex of a decoded .glb must lie within half a lattice cell's diagonal of a vertex of the
-composed mesh, and vice versa. The same holds for the centres of triangles. Triangles must face the
-same way and have the same place in the maps. Colours must agree within 1/255, and maps with a new
-encoding of the stage's images. The tilesets' boxes and errors must agree with surfaces and stage.
+composed mesh, and vice versa. The same holds for the centres of triangles
+(verify/paired_surfaces.py). Triangles must face the same way and have the same place in the maps.
+Colours must agree within 1/255, and maps with a new encoding of the stage's images. The tilesets'
+boxes and errors must agree with surfaces and stage.
 """
 
 import math
@@ -14,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from stereocell.bundle.edited_meshes import with_vertex_occlusion
 from stereocell.formats.basis_textures import (
@@ -30,6 +30,7 @@ from stereocell.model.mesh import Mesh
 from stereocell.usd.read_levels import ComposedLod
 from stereocell.usd.read_textures import read_image
 from stereocell.verify.bundle_files import COLOR_STEP
+from stereocell.verify.paired_surfaces import Pairs, Surface, pair_surfaces
 
 _UM_PER_METRE = 1e6
 _MAP_DIFFERENCE = 1.0  # 0..255, largest mean difference of texels, since encoders may differ
@@ -170,15 +171,15 @@ def _compare_surface(
         length = 2 * float(np.ptp(places, axis=0).max())
         places[:, 0] += lod.mesh.objects * length
         decoded[:, 0] += drawn.objects * length
-    there, here = places[triangles], decoded[drawn.triangles]
-    apart = max(_farthest(places, decoded), _farthest(there.mean(axis=1), here.mean(axis=1)))
-    if apart > limit_m:
+    composed = Surface(places, triangles, lod.mesh.objects)
+    pairs = pair_surfaces(composed, Surface(decoded, drawn.triangles), limit_m)
+    if pairs.apart > limit_m:
         problems.append(
-            f"a vertex is {apart * _UM_PER_METRE:.4g} um from its place in the stage, expected at "
-            f"most {limit_m * _UM_PER_METRE:.4g}"
+            f"a vertex is {pairs.apart * _UM_PER_METRE:.4g} um from its place in the stage, "
+            f"expected at most {limit_m * _UM_PER_METRE:.4g}"
         )
     else:
-        problems += _compare_faces(there, here, triangles, drawn, lod.mesh)
+        problems += _compare_faces(places, decoded, pairs, drawn, lod.mesh)
     away = max(abs(a - b) for a, b in zip(drawn.color, lod.material.color, strict=True))
     if away > COLOR_STEP:
         problems.append(
@@ -193,43 +194,42 @@ def _compare_surface(
         problems.append(
             f"its emission is {drawn.emission}, expected {lod.material.emission} as in the stage"
         )
-    problems += _compare_vertex_colors(drawn, lod.mesh, places, decoded)
+    problems += _compare_vertex_colors(drawn, lod.mesh, pairs)
     problems += _compare_maps(drawn, lod, is_last)
     if (drawn.paint is None) != (lod.mesh.paint is None):
         which = ("bundle", "stage") if drawn.paint is None else ("stage", "bundle")
         problems.append(f"only the {which[1]}, not the {which[0]}, has colours painted on objects")
     elif drawn.paint is not None and lod.mesh.paint is not None:
-        _, nearest = cKDTree(decoded).query(places)
-        off = np.abs(drawn.paint[np.asarray(nearest)] - np.clip(lod.mesh.paint, 0, 1))
+        painted = np.clip(lod.mesh.paint[pairs.vertices], 0, 1)
+        off = np.abs(drawn.paint[pairs.twins] - painted)
         if np.mean(off > COLOR_STEP) > _ODD_SHARE:
             problems.append(
                 f"{np.mean(off > COLOR_STEP):.0%} of its vertices have another painted colour"
             )
-    return apart / drawn.step_m, problems
+    return pairs.apart / drawn.step_m, problems
 
 
 def _compare_faces(
-    there: NDArray[np.float64],
-    here: NDArray[np.float64],
-    triangles: NDArray[np.uint32],
+    places: NDArray[np.float64],
+    decoded: NDArray[np.float64],
+    pairs: Pairs,
     drawn: DecodedMesh,
     mesh: Mesh,
 ) -> Iterator[str]:
     """Yield problems with the facing of triangles, and with their texture coordinates.
 
-    there, here  corners (n, 3, 3) of the stage's and of the bundle's triangles, m
+    places, decoded  vertices (n, 3) of the stage and of the bundle, m
     """
-    _, twins = cKDTree(here.mean(axis=1)).query(there.mean(axis=1))
+    triangles, here_of = pairs.triangles, pairs.twin_triangles
     normals, turned = (
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        for corners in (there, here[np.asarray(twins)])
+        for corners in (places[triangles], decoded[here_of])
     )
     areas = np.linalg.norm(normals, axis=1)
     whole = float(areas.sum())
     odd = float(areas[(normals * turned).sum(axis=1) < 0].sum())
     if odd > _ODD_SHARE * whole:
         yield f"{odd / whole:.0%} of its area faces the other way"
-    here_of = drawn.triangles[np.asarray(twins)]
     off = np.linalg.norm(_means(mesh.normals, triangles) - _means(drawn.normals, here_of), axis=1)
     odd = float(areas[off > _TURNED].sum())
     if odd > _ODD_SHARE * whole:
@@ -249,7 +249,7 @@ def _compare_faces(
     if drawn.uvs is None or mesh.uvs is None:
         return  # missing UVs are reported with the map
     wanted = mesh.uvs.astype(np.float64)[triangles].mean(axis=1)
-    found = drawn.uvs[drawn.triangles].mean(axis=1)[np.asarray(twins)]
+    found = drawn.uvs[here_of].mean(axis=1)
     off = np.abs(found - np.stack([wanted[:, 0], 1 - wanted[:, 1]], axis=1)).max(axis=1)
     odd = float(areas[off > _UV_STEP].sum())
     if odd > _ODD_SHARE * whole:
@@ -283,26 +283,14 @@ def _dimmed(mesh: Mesh) -> NDArray[np.float64] | None:
     return np.asarray(colors * (1 - AMBIENT_SHARE * (1 - openness)))
 
 
-def _farthest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the largest distance from a point (n, 3) of one set to the nearest of the other set.
-
-    Both directions count.
-    """
-    there, back = (np.asarray(cKDTree(c).query(d)[0]) for c, d in ((a, b), (b, a)))
-    return float(max(there.max(), back.max()))
-
-
-def _compare_vertex_colors(
-    drawn: DecodedMesh, mesh: Mesh, places: NDArray[np.float64], decoded: NDArray[np.float64]
-) -> Iterator[str]:
+def _compare_vertex_colors(drawn: DecodedMesh, mesh: Mesh, pairs: Pairs) -> Iterator[str]:
     if mesh.colors is None:
         return
     if drawn.colors is None:
         yield "the mesh's own colours are missing"
         return
-    _, nearest = cKDTree(decoded).query(places)
-    dimmed = np.asarray(drawn.colors[np.asarray(nearest)])  # occlusion may have dimmed the colours
-    if float((dimmed - np.clip(mesh.colors, 0, 1)).max()) > 2 * COLOR_STEP:
+    dimmed = drawn.colors[pairs.twins]  # occlusion may have dimmed the colours
+    if float((dimmed - np.clip(mesh.colors[pairs.vertices], 0, 1)).max()) > 2 * COLOR_STEP:
         yield "the mesh's own colours differ from the stage"
 
 
