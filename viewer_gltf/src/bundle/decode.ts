@@ -10,11 +10,15 @@ export type DecodeRequest = Readonly<{
   parts: readonly Uint8Array[];
   /** Size of each part after decompression, bytes. */
   bytes: number;
+  /** Number of texels along each axis; absent: no ranges of cells are computed. */
+  size?: readonly [number, number, number];
 }>;
 
 export type DecodeAnswer = Readonly<{
   id: number;
   texels?: Uint8Array<ArrayBuffer>;
+  /** `cellRanges` of each part, if the request has a size. */
+  cells?: readonly Uint8Array<ArrayBuffer>[];
   fault?: string;
   /** Index of the part that could not be decompressed. */
   part?: number;
@@ -59,13 +63,37 @@ export async function decodeTexels(
   frames: readonly Frame[],
   bytes: number,
 ): Promise<Uint8Array<ArrayBuffer>> {
+  return (await decode(frames, { bytes })).texels;
+}
+
+/**
+ * Returns the texels of all frames, interleaved, and the `cellRanges` of each. Throws DecodeError.
+ *
+ * @param size number of texels along each axis
+ */
+export function decodeVolume(
+  frames: readonly Frame[],
+  size: readonly [number, number, number],
+): Promise<Required<Pick<DecodeAnswer, "texels" | "cells">>> {
+  return decode(frames, { bytes: size[0] * size[1] * size[2], size });
+}
+
+async function decode(
+  frames: readonly Frame[],
+  asked: Pick<DecodeRequest, "bytes" | "size">,
+): Promise<Required<Pick<DecodeAnswer, "texels" | "cells">>> {
   const port = worker ?? start();
   worker = port;
-  const request: DecodeRequest = { id: ++last, parts: frames.map((each) => each.bytes), bytes };
-  const { texels, fault, part } = await new Promise<DecodeAnswer>((resolve) => {
+  const request = { id: ++last, parts: frames.map((each) => each.bytes), ...asked };
+  const {
+    texels,
+    cells = [],
+    fault,
+    part,
+  } = await new Promise<DecodeAnswer>((resolve) => {
     waiting.set(request.id, { resolve });
-    port.postMessage(request);
+    port.postMessage(request satisfies DecodeRequest);
   });
-  if (texels !== undefined) return texels;
+  if (texels !== undefined) return { texels, cells };
   throw new DecodeError(part ?? 0, `${frames[part ?? 0].name}: ${fault}`);
 }

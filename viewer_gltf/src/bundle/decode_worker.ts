@@ -1,5 +1,6 @@
 /** Decompresses and interleaves the textures of up to four channels, in a worker. */
 import { ZSTDDecoder } from "zstddec";
+import { cellRanges } from "./cell_ranges";
 import type { DecodeAnswer, DecodeRequest } from "./decode";
 
 const decoder = new ZSTDDecoder();
@@ -25,9 +26,7 @@ function unzstd(frame: Uint8Array, bytes: number, part: number): Uint8Array {
   throw new PartFault(part, `found ${decoded.length} texel bytes, expected ${bytes}`);
 }
 
-async function decode({ parts, bytes }: DecodeRequest): Promise<Uint8Array<ArrayBuffer>> {
-  await ready;
-  const decoded = parts.map((part, i) => unzstd(part, bytes, i));
+function interleave(decoded: readonly Uint8Array[], bytes: number): Uint8Array<ArrayBuffer> {
   if (decoded.length === 1) return decoded[0] as Uint8Array<ArrayBuffer>; // already a copy, which can be transferred
   // Three channels take four bytes, since textures of three bytes are slow on some devices.
   const stride = decoded.length === 2 ? 2 : 4;
@@ -38,13 +37,22 @@ async function decode({ parts, bytes }: DecodeRequest): Promise<Uint8Array<Array
   return packed;
 }
 
+async function decode({ id, parts, bytes, size }: DecodeRequest): Promise<DecodeAnswer> {
+  await ready;
+  const decoded = parts.map((part, i) => unzstd(part, bytes, i));
+  const cells = size === undefined ? [] : decoded.map((each) => cellRanges(each, size));
+  return { id, texels: interleave(decoded, bytes), cells };
+}
+
 addEventListener("message", async ({ data }: MessageEvent<DecodeRequest>) => {
   let answer: DecodeAnswer;
   try {
-    answer = { id: data.id, texels: await decode(data) };
+    answer = await decode(data);
   } catch (error) {
     const part = error instanceof PartFault ? error.part : 0;
     answer = { id: data.id, fault: error instanceof Error ? error.message : String(error), part };
   }
-  postMessage(answer, { transfer: answer.texels === undefined ? [] : [answer.texels.buffer] });
+  const { texels, cells = [] } = answer;
+  const arrays = texels === undefined ? [] : [texels, ...cells];
+  postMessage(answer, { transfer: arrays.map(({ buffer }) => buffer) });
 });

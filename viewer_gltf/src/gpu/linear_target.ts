@@ -32,6 +32,17 @@ export function hasHalfFloats(gl: LinearContext): boolean {
   return Array.from((samples ?? []) as Int32Array).some((count) => count >= SAMPLES);
 }
 
+/** Returns a target with `count` textures: the given one, or a new one in its place. */
+export function withTextures(
+  renderer: WebGLRenderer,
+  target: WebGLRenderTarget,
+  count: number,
+): WebGLRenderTarget {
+  if (target.textures.length === count) return target;
+  target.dispose();
+  return linearTarget(renderer, { count });
+}
+
 /** @param count number of textures that are drawn at once */
 export function linearTarget(
   renderer: WebGLRenderer,

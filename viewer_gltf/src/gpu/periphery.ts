@@ -2,7 +2,7 @@
 import type { Vector4, WebGLRenderer, WebGLRenderTarget } from "three";
 import type { Eye, Eyes } from "./eyes";
 import { nothing } from "./float_targets";
-import { linearTarget } from "./linear_target";
+import { linearTarget, withTextures } from "./linear_target";
 import { drawEyes } from "./offscreen_target";
 import { ScreenPass } from "./screen_pass";
 import { FILL_FRAGMENT } from "./shaders/sources";
@@ -18,26 +18,27 @@ export function aimLens({ camera }: Eye, isWorn: boolean, uLens: Vector4): void 
 }
 
 export class FilledPeriphery {
-  readonly target: WebGLRenderTarget;
+  target: WebGLRenderTarget;
   private readonly pass;
 
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly uLens: { value: Vector4 },
   ) {
-    this.target = linearTarget(renderer, { count: 2 });
+    this.target = linearTarget(renderer);
     this.pass = new ScreenPass(FILL_FRAGMENT, { uFirst: nothing(), uSecond: nothing(), uLens });
   }
 
   /**
-   * Fills the skipped pixels in both textures of the march. Along an edge, the march has `scale`
+   * Fills the skipped pixels in the textures of the march. Along an edge, the march has `scale`
    * pixels for each pixel of the frame buffer.
    */
   render({ textures }: WebGLRenderTarget, eyes: Eyes, scale: number): void {
-    const { renderer, pass, target } = this;
+    const { renderer, pass } = this;
     const { uFirst, uSecond } = pass.uniforms;
-    [uFirst.value, uSecond.value] = textures;
-    drawEyes(renderer, pass.scene, eyes, target, scale, (eye, part) => {
+    [uFirst.value, uSecond.value = null] = textures;
+    this.target = withTextures(renderer, this.target, textures.length);
+    drawEyes(renderer, pass.scene, eyes, this.target, scale, (eye, part) => {
       pass.uPart.value.copy(part);
       aimLens(eye, true, this.uLens.value);
     });

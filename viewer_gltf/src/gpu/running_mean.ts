@@ -9,17 +9,17 @@ import {
   type WebGLRenderTarget,
 } from "three";
 import { drawWhole, nothing } from "./float_targets";
-import { linearTarget } from "./linear_target";
+import { linearTarget, withTextures } from "./linear_target";
 import { ScreenPass } from "./screen_pass";
 import { COPY_FRAGMENT } from "./shaders/sources";
 
 export class RunningMean {
   count = 0;
-  readonly target: WebGLRenderTarget;
+  target: WebGLRenderTarget;
   private readonly pass = new ScreenPass(COPY_FRAGMENT, { uFirst: nothing(), uSecond: nothing() });
 
   constructor(private readonly renderer: WebGLRenderer) {
-    this.target = linearTarget(renderer, { count: 2 });
+    this.target = linearTarget(renderer);
     Object.assign(this.pass.material, {
       blending: CustomBlending,
       blendEquation: AddEquation,
@@ -35,7 +35,10 @@ export class RunningMean {
 
   add({ textures, width, height }: WebGLRenderTarget): void {
     const { uFirst, uSecond } = this.pass.uniforms;
-    [uFirst.value, uSecond.value] = textures;
+    [uFirst.value, uSecond.value = null] = textures;
+    const before = this.target;
+    this.target = withTextures(this.renderer, before, textures.length);
+    if (this.target !== before) this.count = 0;
     if (this.target.width !== width || this.target.height !== height) this.count = 0;
     this.count++;
     this.pass.material.blendAlpha = 1 / this.count;

@@ -6,14 +6,15 @@
 import type { Mesh, Scene, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import { type Disc, FIRST, LAST, type MarchedUniforms, Overlay } from "../gpu/composite_pass";
 import type { Eyes } from "../gpu/eyes";
-import { linearTarget } from "../gpu/linear_target";
+import { linearTarget, withTextures } from "../gpu/linear_target";
 import { drawEyes } from "../gpu/offscreen_target";
 import { aimLens, FilledPeriphery } from "../gpu/periphery";
 import { RunningMean } from "../gpu/running_mean";
 import type { MarchFrame } from "../voxels/march_frame";
 
 export class MarchPass {
-  readonly target: WebGLRenderTarget;
+  /** The marched image, and the part behind translucent surfaces if there are any. */
+  target: WebGLRenderTarget;
   private readonly mean: RunningMean;
   readonly filled: FilledPeriphery;
   private readonly front: Overlay;
@@ -25,12 +26,12 @@ export class MarchPass {
     private readonly frame: MarchFrame,
     disc?: Disc,
   ) {
-    this.target = linearTarget(renderer, { count: 2 });
+    this.target = linearTarget(renderer);
     this.mean = new RunningMean(renderer);
     this.filled = new FilledPeriphery(renderer, frame.uLens);
-    const [front, behind] = this.target.textures;
-    this.front = new Overlay(front, frame.uSceneDepth, { order: LAST, disc });
-    this.behind = new Overlay(behind, frame.uSceneDepth, { order: FIRST, disc });
+    const { texture } = this.target;
+    this.front = new Overlay(texture, frame.uSceneDepth, { order: LAST, disc });
+    this.behind = new Overlay(texture, frame.uSceneDepth, { order: FIRST, disc });
   }
 
   /** Meshes that composite the marched images over the frame. */
@@ -65,6 +66,8 @@ export class MarchPass {
    */
   render(scene: Scene, eyes: Eyes, scale: number, gathers = false): void {
     const isWorn = eyes.all.length > 1;
+    const hasPane = this.frame.uHasPane.value;
+    this.target = withTextures(this.renderer, this.target, hasPane ? 2 : 1);
     drawEyes(this.renderer, scene, eyes, this.target, scale, (eye, part) => {
       this.frame.uEye.value.copy(eye.viewport);
       this.frame.uPart.value.copy(part);
@@ -74,12 +77,12 @@ export class MarchPass {
     if (gathers) this.mean.add(this.target);
     else this.mean.count = 0;
     const shown = isWorn ? this.filled : gathers ? this.mean : this;
-    const [front, behind] = shown.target.textures;
+    const [front, behind = front] = shown.target.textures;
     this.front.uniforms.uMarched.value = front;
     this.behind.uniforms.uMarched.value = behind;
     this.scale = scale;
     this.front.show(eyes, scale);
-    if (this.frame.uHasPane.value) this.behind.show(eyes, scale);
+    if (hasPane) this.behind.show(eyes, scale);
   }
 
   hide(): void {

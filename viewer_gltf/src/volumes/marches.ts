@@ -3,12 +3,14 @@
  * its channels.
  */
 import { Group, type Matrix4, Scene, Vector3 } from "three";
+import { cellCounts } from "../bundle/cell_ranges";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { DrawnMarches, MarchView } from "../render/drawn_forms";
 import type { ShownVolume } from "../state/on_screen";
 import { canBeShaded, isTraced } from "../state/parameters/volumes";
 import type { ViewerState } from "../state/viewer_state";
 import { showsBelow } from "../voxels/bricks/shows_below";
+import type { OccupancyRequest } from "../voxels/empty_space";
 import type { MarchFrame } from "../voxels/march_frame";
 import type { Appearance } from "../voxels/march_tables";
 import { brickCounts } from "../voxels/skip_bricks";
@@ -26,6 +28,8 @@ export class Marches implements DrawnMarches {
   readonly scene = new Scene();
   private readonly group = new Group();
   private readonly occupancy = new OccupancyClient();
+  /** Has a worker of its own, since the many cells would delay the tables of bricks. */
+  private readonly cells = new OccupancyClient();
   private readonly shading: LaterShading;
   private skipsUnderWay = 0;
 
@@ -109,12 +113,15 @@ export class Marches implements DrawnMarches {
     const appearances = shown.channels.map((id) => this.appearances.of(state, id));
     if (showsBelow(resident.texture, appearances)) return false;
     const isNewSet = resident.packed?.channels.join() !== shown.channels.join();
+    const isNewLevel = resident.packed?.texture !== shown.texture;
     const { march: before } = resident;
     const march = this.marchOf(resident, shown);
     resident.packed = shown;
     march.composite(isTraced(state) ? "over" : state.compositing);
     const differs = march.setAppearances(appearances);
-    if (differs || isNewSet || march !== before) void this.findSkips(march, shown, appearances);
+    const isNew = differs || isNewSet || march !== before;
+    if (isNew) void this.findSkips(march, shown, appearances);
+    if (isNew || isNewLevel) void this.findCells(march, shown, appearances);
     return true;
   }
 
@@ -140,20 +147,44 @@ export class Marches implements DrawnMarches {
   ): Promise<void> {
     // nothing is skipped until the new table is computed: bricks that the old table skips may be
     // visible now
-    march.skipBy(null);
+    march.skips.setBricks(null);
+    const distances = await this.distancesFrom(this.occupancy, march, {
+      bricks: shown.bricks,
+      alphas: appearances.map(({ table }) => opacities(table)),
+      count: brickCounts(march.volume.size),
+    });
+    if (distances !== null) march.skips.setBricks(distances);
+  }
+
+  /** Finds the smaller cells that a level leaves empty, if it is not a level of streamed bricks. */
+  private async findCells(
+    march: TileMarch,
+    shown: Packed,
+    appearances: readonly Appearance[],
+  ): Promise<void> {
+    if (shown.cells === null) return;
+    const size = march.volume.levels[shown.level].size;
+    const distances = await this.distancesFrom(this.cells, march, {
+      bricks: shown.cells,
+      alphas: appearances.map(({ table }) => opacities(table)),
+      count: cellCounts(size),
+    });
+    if (distances !== null) march.skips.setCells(shown, distances, size);
+  }
+
+  /** Returns null if a newer request has replaced this one, or the march is gone. */
+  private async distancesFrom(
+    client: OccupancyClient,
+    march: TileMarch,
+    request: OccupancyRequest,
+  ): Promise<Uint8Array<ArrayBuffer> | null> {
+    const { tile } = march.volume;
     this.skipsUnderWay++;
-    const distances = await this.occupancy
-      .computeDistances(march.volume.tile, {
-        bricks: shown.bricks,
-        alphas: appearances.map(({ table }) => opacities(table)),
-        count: brickCounts(march.volume.size),
-      })
-      .finally(() => {
-        this.skipsUnderWay--;
-        this.onChange();
-      });
-    if (distances === null || this.residents.get(march.volume.tile)?.march !== march) return;
-    march.skipBy(distances);
+    const distances = await client.computeDistances(tile, request).finally(() => {
+      this.skipsUnderWay--;
+      this.onChange();
+    });
+    return this.residents.get(tile)?.march === march ? distances : null;
   }
 
   /** Passes to each march how far its volume, and the newest mip level of it, have faded in. */
@@ -195,6 +226,7 @@ export class Marches implements DrawnMarches {
 
   dispose(): void {
     this.occupancy.dispose();
+    this.cells.dispose();
     this.shading.dispose();
   }
 }

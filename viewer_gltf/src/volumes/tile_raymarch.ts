@@ -4,17 +4,13 @@ import {
   BackSide,
   BoxGeometry,
   CustomBlending,
-  Data3DTexture,
   GLSL3,
   Matrix4,
   MaxEquation,
   Mesh,
-  NearestFilter,
   OneFactor,
   OneMinusSrcAlphaFactor,
-  RedFormat,
   ShaderMaterial,
-  UnsignedByteType,
   Vector3,
   Vector4,
 } from "three";
@@ -38,22 +34,13 @@ import type { Packed } from "../voxels/tile_texture";
 import { distanceInGrid } from "./blend_order";
 import { occupiedCorners } from "./occupied_bricks";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
+import { SkipTables } from "./skip_tables";
 
 /** Shortest step along a ray, in voxels. */
 const STEP_VOXELS = 1;
 /** Opacity, 0 to 1, at which a ray ends. */
 const OPAQUE = 0.99;
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
-
-function skipTexture(skips: Uint8Array<ArrayBuffer>, size: readonly [number, number, number]) {
-  const texture = new Data3DTexture(skips, ...size);
-  texture.format = RedFormat;
-  texture.type = UnsignedByteType;
-  texture.minFilter = texture.magFilter = NearestFilter;
-  texture.unpackAlignment = 1;
-  texture.needsUpdate = true;
-  return texture;
-}
 
 /** Blending of premultiplied light. */
 const OVER = {
@@ -67,12 +54,7 @@ const ADDED = { ...OVER, blendDst: OneFactor };
 
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
-  /**
-   * Distance table by which rays skip empty bricks. Until it is computed, it is all zeros, so that
-   * nothing is skipped.
-   */
-  private readonly skips: Uint8Array<ArrayBuffer>;
-  private readonly occupancy: Data3DTexture;
+  readonly skips: SkipTables;
   readonly tables: MarchTables;
   private readonly low: Vector3;
   private readonly toTile: Matrix4;
@@ -92,14 +74,12 @@ export class TileMarch {
     const intervals = volume.size.map((n) => n - 1 - 2 * volume.apron);
     const voxel = Math.min(...size.toArray().map((edge, i) => edge / Math.max(1, intervals[i])));
     this.tables = new MarchTables(channelCount);
-    const bricks = brickCounts(volume.size);
-    this.skips = new Uint8Array(bricks[0] * bricks[1] * bricks[2]);
-    this.occupancy = skipTexture(this.skips, bricks);
+    this.skips = new SkipTables(volume.size);
     const material = new ShaderMaterial({
       glslVersion: GLSL3,
       vertexShader: RAYMARCH_VERTEX,
       fragmentShader: RAYMARCH_FRAGMENT,
-      defines: { CHANNELS: channelCount, MAX_STEPS: REST_STEPS, OPAQUE, SKIP_BRICK },
+      defines: { CHANNELS: channelCount, MAX_STEPS: REST_STEPS, OPAQUE },
       side: BackSide,
       transparent: true,
       ...OVER,
@@ -108,13 +88,13 @@ export class TileMarch {
       uniforms: {
         ...frame,
         ...this.tables.uniforms,
+        ...this.skips.uniforms,
         uSize: { value: size },
         uTexLow: { value: low },
         uTexHigh: { value: high },
         uTexels: { value: new Vector3(...volume.size) },
         uVoxel: { value: voxel },
         uMinStep: { value: voxel },
-        uBrickSlack: { value: 0 },
         uToShading: { value: new Matrix4() },
         uShadingCell: { value: 0 },
         uAllInDisc: { value: false },
@@ -132,7 +112,6 @@ export class TileMarch {
         uIndex: { value: null },
         uOldVolume: { value: null },
         uFresh: { value: 1 },
-        uOccupancy: { value: this.occupancy },
       },
     });
     const matrix = new Matrix4().fromArray(volume.matrix);
@@ -243,10 +222,7 @@ export class TileMarch {
     this.define("STREAM_BRICK", shown.index === null ? null : STREAM_BRICK);
     uniforms.uFresh.value = fresh;
     uniforms.uPresence.value = presence;
-    const coarsest = Math.max(shown.level, old?.level ?? 0);
-    // the value ranges of streamed bricks are those of the drawn mip level, even if it is coarse
-    const isExact = coarsest === 0 || shown.index !== null;
-    uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / SKIP_BRICK);
+    this.skips.sync(shown, old);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
   }
 
@@ -275,16 +251,6 @@ export class TileMarch {
     Object.assign(material, how === "over" ? OVER : how === "maximum" ? LARGEST : ADDED);
   }
 
-  /**
-   * Sets where rays may skip, one byte for each brick, from `brickDistances`; null: nowhere for
-   * now.
-   */
-  skipBy(distances: Uint8Array<ArrayBuffer> | null): void {
-    if (distances === null) this.skips.fill(0);
-    else this.skips.set(distances);
-    this.occupancy.needsUpdate = true;
-  }
-
   private define(name: string, value: number | null): void {
     const { material } = this.mesh;
     if ((material.defines[name] ?? null) === value) return;
@@ -297,6 +263,6 @@ export class TileMarch {
     this.mesh.removeFromParent();
     this.mesh.material.dispose();
     this.tables.dispose();
-    this.occupancy.dispose();
+    this.skips.dispose();
   }
 }

@@ -4,7 +4,7 @@
  * once.
  */
 import type { Data3DTexture } from "three";
-import { DecodeError, decodeTexels } from "../bundle/decode";
+import { DecodeError, decodeVolume } from "../bundle/decode";
 import type { LoadQueue } from "./load_queue";
 import { texels } from "./mip_levels";
 import type { VolumeSource } from "./volume_source";
@@ -21,6 +21,8 @@ export type Packed = Readonly<{
   index: Data3DTexture | null;
   /** Smallest and largest intensity of each brick of each channel, interleaved. */
   bricks: readonly Uint8Array[];
+  /** `cellRanges` of each channel at this level; null for an atlas, whose bricks change. */
+  cells: readonly Uint8Array[] | null;
 }>;
 
 export class TileTexture {
@@ -160,17 +162,18 @@ export class TileTexture {
       bytes: each.frame,
       name: `${each.source.volume.file.path}: level ${level}`,
     }));
-    let data: Uint8Array<ArrayBuffer>;
+    let decoded: Awaited<ReturnType<typeof decodeVolume>>;
     try {
-      data = await decodeTexels(frames, texels(source.volume.levels[level]));
+      decoded = await decodeVolume(frames, size);
     } catch (error) {
       if (!(error instanceof DecodeError)) throw error;
       this.failed.add(channels[error.part]);
       this.onError(error);
       return null;
     }
-    const texture = volumeTexture(data, size, channels.length);
-    return { channels, level, texture, index: null, bricks: whole.map(({ bricks }) => bricks) };
+    const texture = volumeTexture(decoded.texels, size, channels.length);
+    const bricks = whole.map((each) => each.bricks);
+    return { channels, level, texture, index: null, bricks, cells: decoded.cells };
   }
 
   private async fetch(id: string, level: number, signal: AbortSignal) {

@@ -9,6 +9,7 @@ import {
   WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
+import { cellCounts, cellRanges } from "viewer/bundle/cell_ranges";
 import type { TileVolume } from "viewer/bundle/generated/volumes";
 import { Cuts } from "viewer/gpu/clip_planes";
 import { EncodePass } from "viewer/gpu/encode_pass";
@@ -19,7 +20,6 @@ import { MarchPass } from "viewer/render/raymarch_pass";
 import { TileMarch } from "viewer/volumes/tile_raymarch";
 import { occupancyDistances } from "viewer/voxels/empty_space";
 import { makeFrame } from "viewer/voxels/march_frame";
-import { brickCounts } from "viewer/voxels/skip_bricks";
 import { opacities } from "viewer/voxels/transfer_luts";
 import { serve } from "./page";
 import type { About, Camera, Renderer, Scene } from "./scene";
@@ -116,10 +116,13 @@ function marchOf({ about, voxels, bricks }: Scene, frame: ReturnType<typeof make
   texture.unpackAlignment = 1;
   texture.needsUpdate = true;
   const march = new TileMarch(volume, 1, frame);
-  march.show({ channels: ["A"], level: 0, texture, index: null, bricks: [bricks] }, null, 1, 1);
+  const cells = [cellRanges(voxels, volume.size)];
+  const shown = { channels: ["A"], level: 0, texture, index: null, bricks: [bricks], cells };
+  const alphas = [opacities(table)];
   march.setAppearances([{ color: about.color, table, isInDisc: false }]);
-  const count = brickCounts(volume.size);
-  march.skipBy(occupancyDistances({ bricks: [bricks], alphas: [opacities(table)], count }));
+  const count = cellCounts(volume.size);
+  march.skips.setCells(shown, occupancyDistances({ bricks: cells, alphas, count }), volume.size);
+  march.show(shown, null, 1, 1);
   return march;
 }
 

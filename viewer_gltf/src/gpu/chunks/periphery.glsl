@@ -14,6 +14,7 @@ float tangentAt(vec2 pixel, vec4 part) {
 }
 
 float shareOfSteps(vec2 pixel, vec4 part) {
+  if (uLens.x <= 0.0) return 1.0;
   return 1.0 - 0.5 * smoothstep(SPARSE.x, SPARSE.y, tangentAt(pixel, part));
 }
 

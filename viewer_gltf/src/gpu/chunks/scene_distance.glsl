@@ -27,7 +27,9 @@ vec3 sceneDistances(float back) {
   ivec2 pixel = pixelHere();
   ivec2 first = ivec2(uEye.xy);  // the other eye's depth begins next to this one's
   ivec2 last = ivec2(uEye.xy + uEye.zw) - 1;
-  float near = distanceOf(texelFetch(uSceneDepth, pixel, 0).r, back);
+  float nearest = texelFetch(uSceneDepth, pixel, 0).r;
+  float near = distanceOf(nearest, back);
+  if (nearest >= 1.0) return vec3(near, near, 0.0);  // nothing lies behind the far plane
   float far = near;
   float farther = 0.0;
   for (int i = 0; i < 4; i++) {

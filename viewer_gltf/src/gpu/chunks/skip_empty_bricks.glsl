@@ -8,9 +8,9 @@ vec2 blockAhead(vec3 start, vec3 dir, vec3 invDir, float t) {
   ivec3 last = textureSize(uOccupancy, 0) - 1;
   float stored = texelFetch(uOccupancy, clamp(ivec3(brick), ivec3(0), last), 0).r;
   float d = floor(stored * 255.0 + 0.5) - uBrickSlack;
-  float around = max(d, 1.0);
-  vec3 wall = brick + mix(vec3(1.0 - around), vec3(around), step(0.0, dir));
-  vec3 exits = (wall - start) * invDir;
+  // the wall of the brick through which the ray entered, and as many bricks along each axis
+  vec3 entry = brick + 1.0 - step(0.0, dir);
+  vec3 exits = (entry - start) * invDir + max(d, 1.0) * abs(invDir);
   float exit = min(min(exits.x, exits.y), exits.z);
   return vec2(max(exit, t) + 1e-3 * uVoxel, step(1.0, d));
 }

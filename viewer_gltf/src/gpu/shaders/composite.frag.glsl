@@ -22,6 +22,7 @@ out vec4 oColor;
 
 void main() {
   oColor = marchedLight(gl_FragCoord.xy);
+  if (oColor == vec4(0.0)) discard;  // saves the blending of all samples of the pixel
 #ifdef CROSSING
   if (!uIsCrossing) return;
   int i = eyeAt(gl_FragCoord.xy);

@@ -26,6 +26,8 @@ uniform int uSpare;  // steps reserved for the other tiles, one each
 uniform vec3 uAllLow;  // um, the same space: low corner of the box around all marched tiles
 // High corner of that box; each tile gets steps by its share of the ray's length.
 uniform vec3 uAllHigh;
+uniform vec3 uSkipScale;  // bricks of uOccupancy along the whole texture
+uniform float uSkipShift;  // brick at the texture's low corner
 uniform float uBrickSlack;  // bricks by which a coarse mip level spreads beyond its brick
 uniform vec3 uColor[CHANNELS];  // linear RGB
 #ifdef DISC
@@ -108,6 +110,10 @@ layout(location = 1) out vec4 oBehind;  // behind the pane
 
 const float NOWHERE = 1e30;
 
+// Share of a pixel, 0 to 1, below which a sample is lit as matter without a boundary. Its gradient
+// would take eight samples more, and change less than half a step of 8 bits.
+const float FAINT = 0.002;
+
 #ifdef SUM
 // Light that a ray collects in opaque matter as long as the mean edge of the box around all tiles; 1
 // is white. The value is above 1, because few specimens are more than half full. Thin structures
@@ -141,7 +147,9 @@ vec4 shown(vec4 sum) {
 }
 
 void main() {
-  if (isLeftOut(ivec2(gl_FragCoord.xy), uPart)) discard;
+  // Nothing is added where a ray ends here. Some drivers run the rest of a shader after `discard`.
+  oColor = oBehind = vec4(0.0);
+  if (isLeftOut(ivec2(gl_FragCoord.xy), uPart)) return;
   vec3 ray = vPosition - vEye;
   float back = length(ray);
   vec3 dir = ray / back;
@@ -161,13 +169,13 @@ void main() {
   vec3 start = vEye + span.x * dir;
   float edge = min(span.y, scene.x) - span.x;
   float end = min(span.y, scene.y) - span.x;
-  if (end <= 0.0) discard;
+  if (end <= 0.0) return;
 
   vec3 texPerUm = (uTexHigh - uTexLow) / uSize;
   vec3 texStart = uTexLow + start * texPerUm;
   vec3 texDir = dir * texPerUm;
-  vec3 brickStart = texStart * uTexels / float(SKIP_BRICK);  // the same ray, in units of bricks
-  vec3 brickDir = texDir * uTexels / float(SKIP_BRICK);
+  vec3 brickStart = texStart * uSkipScale + uSkipShift;  // the same ray, in units of bricks
+  vec3 brickDir = texDir * uSkipScale;
   brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
   vec3 invBrickDir = 1.0 / brickDir;
 #ifdef MAXIMUM
@@ -187,7 +195,9 @@ void main() {
 #endif
   float t = 0.0;
   float exit = 0.0;  // t up to which the bricks were looked up
-  int i = 0;
+  float slack = 1e-3 * uMinStep;  // a shorter rest of the ray is no more than rounding
+  float left = float(steps);  // steps that are left; they divide the rest of the ray to its end
+  float dt = max(uMinStep, end / left);
 #if defined(MAXIMUM) || defined(SUM)
   const float FULL = 2.0;  // no sample hides another
 #else
@@ -198,24 +208,20 @@ void main() {
   bool isPast = false;  // whether the ray has passed `edge`
   for (int leg = 0; leg < 3; leg++) {
     float stop = min(isPast ? end : edge, pane);
-    for (; i < steps && t < stop && sum.a < FULL; i++) {
-      // The rest of the ray is divided by the number of steps that are left, so that the ray always
-      // reaches its end.
-      float dt = max(uMinStep, (end - t) / float(steps - i));
+    float brink = stop - slack;
+    while (t < brink) {
       // Skipping has a separate loop, so that neighbouring rays sample together, however much they
       // skipped.
       while (t >= exit) {
         vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
         // The ray skips whole steps, so that samples lie where they would lie without skipping.
         float skip = block.y * floor((block.x - t) / dt) * dt;
-        exit = skip > 0.0 ? t + skip : block.x;
-        if (skip <= 0.0) break;
-        t = exit;
-        if (++i >= steps || t >= end) break;
-        dt = max(uMinStep, (end - t) / float(steps - i));
+        t += skip;
+        exit = skip > 0.0 && t < brink ? t : max(block.x, t + 0.5 * dt);
+        left -= step(dt, skip);
+        dt = max(uMinStep, (end - t) / max(left, 1.0));
       }
-      if (i >= steps || t >= stop) break;
-      float here = min(dt, stop - t);  // the last step may be shorter
+      float here = clamp(stop - t, 0.0, dt);  // the last step may be shorter; 0 after the last skip
       float at = t + shift * here;
       vec3 p = texStart + at * texDir;
       vec4 v = sampleIntensities(p);
@@ -244,8 +250,9 @@ void main() {
 #else
         if (s.a > 0.0) {
 #ifndef UNLIT  // for the benchmark, which times other programs without lighting
-          vec3 gradient = -face;
-          if (t >= uVoxel || face == vec3(0.0)) {
+          bool isCut = t < uVoxel && face != vec3(0.0);
+          vec3 gradient = isCut ? -face : vec3(0.0);
+          if (!isCut && (1.0 - sum.a) * s.a >= FAINT) {
             gradient = gradientAt(p, texPerUm, uContrast * shares);
           }
           s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
@@ -255,8 +262,12 @@ void main() {
 #endif
       }
       t += here;
+      left -= step(slack, here);
+      brink = sum.a < FULL ? brink : 0.0;
     }
-    if (i >= steps || t >= end || sum.a >= FULL) break;
+    if (sum.a >= FULL) break;
+    t = max(t, stop);
+    if (t >= end) break;
     if (t >= pane) {
       front = isPast ? mix(veil, sum, scene.z) : sum;
       sum = veil = vec4(0.0);
@@ -272,12 +283,11 @@ void main() {
     }
   }
 #ifdef COUNT_STEPS  // for tests: the number of steps, and the share of the ray that they covered
-  oColor = vec4(float(i % 256) / 255.0, float(i / 256) / 255.0, clamp(t / end, 0.0, 1.0), 1.0);
+  int count = steps - int(left);
+  oColor = vec4(float(count % 256) / 255.0, float(count / 256) / 255.0, clamp(t / end, 0.0, 1.0), 1.0);
   return;
 #endif
   if (isPast) sum = mix(veil, sum, scene.z);
-  vec4 most = max(sum, front);
-  if (max(max(most.r, most.g), max(most.b, most.a)) <= 0.0) discard;
   oColor = shown(isBehind ? front : sum);
   oBehind = isBehind ? shown(sum) : vec4(0.0);
 }

@@ -255,7 +255,7 @@ export class BrickTile {
     if (!isWhole) return;
     index.needsUpdate = true;
     const finest = Number.isFinite(level) ? level : 0;
-    this.shown = { channels: ids, level: finest, texture: atlas, bricks, index };
+    this.shown = { channels: ids, level: finest, texture: atlas, bricks, cells: null, index };
     this.onChange();
   }
 

@@ -74,7 +74,7 @@ class Shown {
       environmentTables({ ...run.environment, rgb: Float32Array.from(run.environment.rgb) }),
     );
     this.march = new TileMarch(boxOf(run), this.texels.channels.length, this.frame);
-    this.march.show(this.texels, null, 1, 1);
+    this.march.show({ ...this.texels, cells: null }, null, 1, 1);
     this.march.clip(this.clip);
     this.scene.add(this.march.mesh);
     this.camera = cameraOf(run);

@@ -11,7 +11,9 @@ import {
   WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
+import { cellCounts, cellRanges } from "../../../src/bundle/cell_ranges";
 import type { TileVolume } from "../../../src/bundle/generated/volumes";
+import type { Size3 } from "../../../src/bundle/ktx2";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { Eyes } from "../../../src/gpu/eyes";
 import { DepthPass } from "../../../src/render/depth_pass";
@@ -52,13 +54,16 @@ function texture3D(texels: Uint8Array<ArrayBuffer>, side: number): Data3DTexture
   return texture;
 }
 
+/** The table by which rays skip empty space. */
+export type Skips = "bricks" | "cells";
+
 /** @param table 256 RGBA entries */
 export function marchOf(
   volume: TileVolume,
   texels: Uint8Array<ArrayBuffer>,
   bricks: Uint8Array,
   table: Uint8Array,
-  hasSkips: boolean,
+  skips: Skips | null,
   depth: DepthPass,
   table2d: TransferTable2d | null = null,
 ): TileMarch {
@@ -67,12 +72,18 @@ export function marchOf(
   frame.uEye.value.set(0, 0, PIXELS, PIXELS);
   frame.uPart.value.set(0, 0, PIXELS, PIXELS);
   const march = new TileMarch(volume, 1, frame);
+  const cells = [cellRanges(texels, volume.size)];
   const texture = texture3D(texels, side);
-  march.show({ channels: ["A"], level: 0, texture, index: null, bricks: [bricks] }, null, 1, 1);
+  const shown = { channels: ["A"], level: 0, texture, index: null, bricks: [bricks], cells };
   march.setAppearances([{ color: [1, 1, 1], table, table2d, isInDisc: false }]);
-  const count = brickCounts(volume.size);
-  const skips = { bricks: [bricks], alphas: [opacities(table)], count };
-  if (hasSkips) march.skipBy(occupancyDistances(skips));
+  const distances = (ranges: readonly Uint8Array[], count: Size3) =>
+    occupancyDistances({ bricks: ranges, alphas: [opacities(table)], count });
+  if (skips === "bricks") {
+    march.skips.setBricks(distances(shown.bricks, brickCounts(volume.size)));
+  } else if (skips === "cells") {
+    march.skips.setCells(shown, distances(cells, cellCounts(volume.size)), volume.size);
+  }
+  march.show(shown, null, 1, 1);
   return march;
 }
 
@@ -92,7 +103,7 @@ function makeMarch(
   const entries = new Uint8Array(1024).fill(255);
   for (let i = 0; i < 256; i++) entries[4 * i + 3] = i === 0 ? 0 : opacity;
   const full = new Uint8Array(side ** 3).fill(255);
-  return marchOf(volume, full, ranges, entries, true, depth);
+  return marchOf(volume, full, ranges, entries, "bricks", depth);
 }
 
 /** Draws marches, one over the other, as `camera` sees them. Returns the pixels by row. */
@@ -206,14 +217,14 @@ export function randomScene(seed: number, side: number) {
  * Returns the largest difference between a random scene drawn with and without skips, and the
  * number of visible pixels.
  */
-function compareSkips(seed: number): Readonly<{ apart: number; drawn: number }> {
+function compareSkips(seed: number, skips: Skips): Readonly<{ apart: number; drawn: number }> {
   const side = 51; // rays are shorter than the steps, so samples are at whole voxels
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
   const { texels, table, bricks } = randomScene(seed, side);
-  const [skipping, plain] = [true, false].map((hasSkips) =>
+  const [skipping, plain] = [skips, null].map((by) =>
     draw(
-      [marchOf(cube(side), texels, bricks, table, hasSkips, depth)],
+      [marchOf(cube(side), texels, bricks, table, by, depth)],
       diagonalCamera(side - 3),
       depth,
       renderer,
@@ -252,7 +263,7 @@ function meanAlong(
   const table = new Uint8Array(1024).fill(255);
   for (let i = 0; i < 256; i++) table[4 * i + 3] = Math.round((opacity * i) / 255);
   const bricks = makeBricks({ size: [side, side, side], texels }).texels;
-  const march = marchOf(cube(side), texels, bricks, table, true, depth);
+  const march = marchOf(cube(side), texels, bricks, table, "bricks", depth);
   march.composite(compositing);
   march.setAppearances([{ color: [1, 1, 1], table, window, isInDisc: false }]);
   if (isUnlit) march.mesh.material.defines.UNLIT = 1;

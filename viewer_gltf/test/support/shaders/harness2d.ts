@@ -46,7 +46,7 @@ function showSlope(values: Range, gradients: Range, opacity: number): number[] {
   }
   const bricks = makeBricks({ size: [SIDE, SIDE, SIDE], texels }).texels;
   const table2d = oneTable2d(values, gradients, opacity);
-  const march = marchOf(cube(SIDE), texels, bricks, table2d.envelope, true, depth, table2d);
+  const march = marchOf(cube(SIDE), texels, bricks, table2d.envelope, "bricks", depth, table2d);
   const away = 300;
   const fov_deg = (2 * Math.atan(0.5 / away) * 180) / Math.PI;
   const camera = new PerspectiveCamera(fov_deg, 1, EDGE, EDGE * 1000);
@@ -73,7 +73,7 @@ function compareAlike(seed: number): Apart {
   const alike = { cells: alikeRows(table), gradientMax: 0.3, envelope: table };
   const [flat, table2d] = [null, alike].map((each) =>
     draw(
-      [marchOf(cube(SIDE), texels, bricks, table, true, depth, each)],
+      [marchOf(cube(SIDE), texels, bricks, table, "bricks", depth, each)],
       diagonalCamera(EDGE),
       depth,
       renderer,
@@ -94,9 +94,9 @@ function compareSkips2d(seed: number): Apart {
     opacity: random(),
   }));
   const table2d = transferTable2d(shapes, { gradient_max: 0.2, functions: {} }, [0, 1], 1);
-  const [skipping, plain] = [true, false].map((hasSkips) =>
+  const [skipping, plain] = (["cells", null] as const).map((skips) =>
     draw(
-      [marchOf(cube(SIDE), texels, bricks, table2d.envelope, hasSkips, depth, table2d)],
+      [marchOf(cube(SIDE), texels, bricks, table2d.envelope, skips, depth, table2d)],
       diagonalCamera(EDGE),
       depth,
       renderer,

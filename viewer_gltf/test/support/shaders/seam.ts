@@ -68,7 +68,12 @@ export function columnsOverBorder(): number[][] {
   for (const left of [0, EDGE]) {
     const march = new TileMarch(cube(SIDE, left), 2, frame);
     const bricks = [new Uint8Array(1), new Uint8Array(1)];
-    march.show({ channels: ["A", "B"], level: 0, texture, index: null, bricks }, null, 1, 1);
+    march.show(
+      { channels: ["A", "B"], level: 0, texture, index: null, bricks, cells: null },
+      null,
+      1,
+      1,
+    );
     march.setAppearances(COLORS.map((color) => ({ color, table, isInDisc: false })));
     march.sortBy(camera.position);
     march.shareWith(new Vector3(0, -EDGE, 0), new Vector3(2 * EDGE, 0, EDGE), 2);
