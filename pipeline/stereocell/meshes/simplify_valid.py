@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from stereocell.kernels.half_edges import measure_sides
+from stereocell.kernels.placement import follow_moves
 from stereocell.meshes.simplify import NOTHING, Moves, find_errors, renumber, simplify_part
 from stereocell.meshes.validity import Defects, Topology, find_defects, find_topology
 from stereocell.model.lattice import Plane
@@ -40,6 +41,8 @@ class Simplified:
 
     topology          topology of the simplified mesh
     vertices          int64 (k,), index of each vertex in the given mesh, rising
+    owners            int32 (n,), the vertex (0..k-1) that stands for each vertex of the given mesh;
+                      -1: none does
     changed           bool (k,), vertices of bodies that were simplified in this call
     simplified_again  number of bodies that were simplified more than once
     fallbacks         number of bodies that kept their given surface
@@ -48,6 +51,7 @@ class Simplified:
     mesh: Mesh
     topology: Topology
     vertices: NDArray[np.int64]
+    owners: NDArray[np.int32]
     changed: NDArray[np.bool_]
     simplified_again: int
     fallbacks: int
@@ -153,7 +157,10 @@ class Simplifier:
             self._redone |= chosen
             changed |= chosen
         again, fallbacks = int((self._redone & ~self._kept).sum()), int(self._kept.sum())
-        return Simplified(draft, found, used, changed[body[used]], again, fallbacks)
+        place = np.full(len(mesh.positions), -1, np.int32)
+        place[used] = np.arange(len(used), dtype=np.int32)
+        owners = place[follow_moves(self._moves, len(place))]
+        return Simplified(draft, found, used, owners, changed[body[used]], again, fallbacks)
 
     def _are_faulty(self) -> NDArray[np.bool_]:
         """Return which of all triangles touch a defect of the last draft, bool (m,)."""

@@ -1,10 +1,10 @@
 """Make all levels of detail of one unit from its fine surface; validate and measure each of them.
 
 Each level is simplified from the one before, so that its vertices are a part of that level's. Then
-it gets its volume back (meshes/keep_volume.py). Bodies between near walls may have no space to
-grow. These are simplified less, and at last not at all, as long as the level hardly becomes larger.
-Rims do not change. Small bodies are removed as a whole if they would become thinner than the error
-(meshes/small_bodies.py).
+they move to places near the fine surface, and bodies get their volumes back
+(meshes/keep_volume.py). Bodies between near walls may have no space to grow. These are simplified
+less, and at last not at all, as long as the level hardly becomes larger. Rims do not change. Small
+bodies are removed as a whole if they would become thinner than the error (meshes/small_bodies.py).
 """
 
 from collections.abc import Callable
@@ -83,6 +83,8 @@ def make_levels(
         bodies = SmallBodies(fine, topology)
     with clock("measure"):
         to_fine = of_all = Nearest(fine, lod.samples)
+    # The vertex of `mesh` that stands for each fine vertex; -1: none does
+    owners = np.arange(len(fine.positions), dtype=np.int32)
     gone = np.zeros(len(fine.positions), bool)
     for level, error in list(enumerate(lod.errors))[first:]:
         length = error * min(spacing_um)
@@ -92,14 +94,18 @@ def make_levels(
                 gone = small
                 stay = ~gone[number[mesh.triangles[:, 0]]]
                 used = np.unique(mesh.triangles[stay])
+                left = np.full(len(number), -1, np.int32)
+                left[used] = np.arange(len(used), dtype=np.int32)
                 mesh, number = compact(mesh, mesh.triangles[stay]), number[used]
+                owners = _follow(owners, left)
                 topology = None
             topology = topology or find_topology(mesh.triangles, len(mesh.positions))
         simplifier = Simplifier(mesh, planes, topology, caps)
-        simplified, kept = _simplify(simplifier, topology, number, volumes, length, clock)
+        simplified, kept = _simplify(simplifier, topology, (number, owners), volumes, length, clock)
         # The earlier mesh and topology take much memory, which this frees.
         mesh, topology = simplified.mesh, simplified.topology
         number, shown = number[simplified.vertices], kept.mesh
+        owners = _follow(owners, simplified.owners)
         with clock("measure"):
             if gone.any():
                 to_fine = of_all.without(gone)
@@ -132,7 +138,7 @@ def make_levels(
 def _simplify(
     simplifier: Simplifier,
     topology: Topology,
-    number: NDArray[np.int64],
+    ancestry: tuple[NDArray[np.int64], NDArray[np.int32]],
     volumes: FineVolumes,
     error_um: float,
     clock: Clock,
@@ -141,8 +147,10 @@ def _simplify(
 
     simplifier  holds the next finer level, which it simplifies
     topology    topology of the next finer level
-    number      index of each vertex of the next finer level in the fine mesh
+    ancestry    index of each vertex of the next finer level in the fine mesh, and the vertex of the
+                next finer level that stands for each fine one; -1: none does
     """
+    number, owners = ancestry
     with clock("simplify"):
         simplified = simplifier.simplify(error_um)
     count = len(simplified.mesh.triangles)
@@ -154,6 +162,7 @@ def _simplify(
             kept = volumes.keep(
                 simplified.mesh,
                 own,
+                _follow(owners, simplified.owners),
                 max_move_um=error_um,
                 topology=simplified.topology,
                 earlier=earlier,
@@ -170,6 +179,17 @@ def _simplify(
         earlier = EarlierLevel(kept, own, simplified.changed)
     assert best is not None
     return best
+
+
+def _follow(owners: NDArray[np.int32], onto: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the vertex that stands for each fine vertex, after vertices became others.
+
+    owners  int32 (n,), the vertex that stood for each fine vertex before; -1: none did
+    onto    int32 (k,), the vertex that each of these vertices became; -1: none
+    """
+    followed = onto[owners]
+    followed[owners < 0] = -1
+    return followed
 
 
 def sharpest_angle(mesh: Mesh) -> float:
