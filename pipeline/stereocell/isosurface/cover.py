@@ -7,6 +7,7 @@ All voxels are compared, even if the surface was extracted from only some planes
 solid is linear between these planes, and constant beyond the last one.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -44,33 +45,59 @@ def measure_cover(
     level = iso.at(lattice.window)
     if background is not None:
         level = level + background.at(lattice.window)
-    is_above = (voxels > level)[own]
+    levels = np.broadcast_to(level, voxels.shape)[own]
+    left_out = None
     if holder is not None:
-        is_above &= ~np.broadcast_to(holder.at(lattice.window), voxels.shape)[own]
-    is_inside = between_planes(distance, lattice, step) > 0
-    source, solid = int(is_above.sum()), int(is_inside.sum())
-    return Cover(source, int((is_above & is_inside).sum()), solid)
+        left_out = np.broadcast_to(holder.at(lattice.window), voxels.shape)[own]
+    source, both, solid = 0, 0, 0
+    for z, field in enumerate(planes_between(distance, lattice, step)):
+        is_above = voxels[own][z] > levels[z]
+        if left_out is not None:
+            is_above &= ~left_out[z]
+        is_inside = field > 0
+        source += int(np.count_nonzero(is_above))
+        solid += int(np.count_nonzero(is_inside))
+        both += int(np.count_nonzero(is_above & is_inside))
+    return Cover(source, both, solid)
 
 
-def between_planes(field: NDArray[np.float32], lattice: Lattice, step: Step) -> NDArray[np.float32]:
-    """Return a field of the thinned lattice's window at all of the tile's own points.
+def planes_between(
+    field: NDArray[np.float32], lattice: Lattice, step: Step
+) -> Iterator[NDArray[np.float32]]:
+    """Yield a field of the thinned lattice's window at each z of the tile's own points, (y, x).
 
     The field is linear between two planes of the thinned lattice, and constant beyond the last one.
     """
     first = lattice.thinned(step).window.start
-    for axis in range(3):
-        if step[axis] == 1:
-            start = lattice.own.start[axis] - lattice.window.start[axis]
-            stop = lattice.own.stop[axis] - lattice.window.start[axis]
-            field = field[(slice(None),) * axis + (slice(start, stop),)]
-            continue
-        points = np.arange(lattice.own.start[axis], lattice.own.stop[axis])
-        planes, past = np.divmod(points - lattice.region.start[axis], step[axis])
-        last = field.shape[axis] - 1
-        low = np.clip(planes - first[axis], 0, last)
-        below = np.take(field, low, axis)
-        shape = [-1 if axis == k else 1 for k in range(3)]
-        share = (past / step[axis]).astype(np.float32).reshape(shape)
-        below += (np.take(field, np.minimum(low + 1, last), axis) - below) * share
-        field = below
-    return field
+    z, y, x = (
+        _find_neighbours(axis, lattice, step[axis], first[axis], field.shape[axis])
+        for axis in range(3)
+    )
+    for low, high, share in zip(*z, strict=True):
+        plane = field[low]
+        if step[0] > 1:
+            plane = plane + (field[high] - plane) * share
+        for axis, (lows, highs, shares) in enumerate((y, x)):
+            below = plane.take(lows, axis)
+            if step[axis + 1] > 1:
+                shares = shares[:, None] if axis == 0 else shares
+                below += (plane.take(highs, axis) - below) * shares
+            plane = below
+        yield plane
+
+
+def _find_neighbours(
+    axis: int, lattice: Lattice, step: int, first: int, count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+    """Return the two planes beside each of the tile's own points along an axis, and the share.
+
+    first, count  index of the first plane, and the number of planes
+    result        indices of the planes below and above, and the way between them, 0..1
+    """
+    points = np.arange(lattice.own.start[axis], lattice.own.stop[axis])
+    if step == 1:  # planes of the window, which are not counted from the region's start
+        low = points - lattice.window.start[axis]
+        return low, low, np.zeros(len(low), np.float32)
+    planes, past = np.divmod(points - lattice.region.start[axis], step)
+    low = np.clip(planes - first, 0, count - 1)
+    return low, np.minimum(low + 1, count - 1), (past / step).astype(np.float32)

@@ -111,16 +111,19 @@ def shorten_moves(
     halvings          number of times that a move is shortened; the last time, it becomes 0
     """
     at, shortened = start + moves, np.zeros(len(start), np.int8)
-    is_due = np.zeros(len(start), np.bool_)
+    has_changed, is_due = np.ones(len(start), np.bool_), np.zeros(len(start), np.bool_)
     any_due = True
     while any_due:
         any_due = False
         for t in range(len(triangles)):
             a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            if not (has_changed[a] | has_changed[b] | has_changed[c]):
+                continue
             least = min(shortened[a], min(shortened[b], shortened[c]))
             if least < halvings and _is_spoilt(start, at, a, b, c, sharpest):
                 is_due[a] = is_due[b] = is_due[c] = any_due = True
         for v in range(len(start)):
+            has_changed[v] = is_due[v]
             if is_due[v]:
                 shortened[v] = min(shortened[v] + 1, halvings)
                 factor = 0.5 if shortened[v] < halvings else 0.0

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.half_edges import measure_volumes, sum_gains, sum_normals
 from stereocell.kernels.placement import move_along
+from stereocell.kernels.triangle_rows import touch
 from stereocell.meshes.place_vertices import FinePlanes
 from stereocell.meshes.validity import (
     Defects,
@@ -171,7 +172,7 @@ class FineVolumes:
             share[same] = earlier.kept.share[place]
             # Triangles in earlier defects are checked again.
             was_faulty = np.isin(vertices, earlier.at_fault)
-            fresh = np.asarray((earlier.changed | was_faulty)[triangles].any(axis=1))
+            fresh = touch(earlier.changed | was_faulty, triangles)
         moves = self._find_moves(
             start, triangles, (label, count), wanted, share, max_move_um, places
         )
@@ -187,7 +188,7 @@ class FineVolumes:
                 # Only triangles that moved, or were in a defect, are checked again.
                 other = (positions != placed.positions).any(axis=1)
                 other[faulty] = True
-                fresh = other[mesh.triangles].any(axis=1)
+                fresh = touch(other, triangles)
             placed = replace(mesh, positions=positions)
             defects = find_defects(placed, planes=planes, fresh=fresh, topology=topology)
             faulty = defects.vertices(mesh.triangles)

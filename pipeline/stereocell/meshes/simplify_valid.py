@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from stereocell.kernels.half_edges import measure_sides
 from stereocell.kernels.placement import follow_moves
+from stereocell.kernels.triangle_rows import differ, touch
 from stereocell.meshes.simplify import NOTHING, Moves, find_errors, renumber, simplify_part
 from stereocell.meshes.validity import Defects, Topology, find_defects, find_topology
 from stereocell.model.lattice import Plane
@@ -130,7 +131,7 @@ class Simplifier:
             many = worst & (hits > np.maximum(MANY * size, COSTLY))
             ended = (worst & (rounds == ROUNDS)) | (many & (halvings == HALVINGS))
             # Crossings of given triangles cannot be repaired by simplifying less.
-            given = (self._corners == mesh.triangles).all(axis=1)[self._left]
+            given = ~differ(self._corners, mesh.triangles)[self._left]
             as_given = defects.crossings[given[defects.crossings].all(axis=1)]
             ended[body[used[own[as_given, 0]]]] = True
             ended &= worst
@@ -164,7 +165,7 @@ class Simplifier:
 
     def _are_faulty(self) -> NDArray[np.bool_]:
         """Return which of all triangles touch a defect of the last draft, bool (m,)."""
-        return np.asarray(self._faulty[self._corners].any(axis=1))
+        return touch(self._faulty, self._corners)
 
     def _simplify_again(
         self, chosen: NDArray[np.bool_], *, repeats_moves: bool = False
@@ -200,7 +201,7 @@ class Simplifier:
     ) -> NDArray[np.bool_]:
         rows = np.flatnonzero(chosen[self._body_of])
         other = np.zeros(len(self._corners), bool)
-        other[rows] = ~self._left[rows] | (corners != self._corners[rows]).any(axis=1)
+        other[rows] = ~self._left[rows] | differ(corners, self._corners[rows])
         self._corners[rows], self._left[rows] = corners, left
         stay = ~chosen[self._bodies[0][self._moves[:, 0]]]
         self._moves = np.concatenate([self._moves[stay], moves])

@@ -16,7 +16,7 @@ from stereocell.kernels.half_edges import measure_sharpest
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.keep_volume import Box, EarlierLevel, FineVolumes, RestoredLevel
 from stereocell.meshes.options import LodOptions
-from stereocell.meshes.simplify import compact
+from stereocell.meshes.simplify import renumber
 from stereocell.meshes.simplify_valid import Simplified, Simplifier
 from stereocell.meshes.small_bodies import SmallBodies
 from stereocell.meshes.validity import Topology, find_topology
@@ -82,7 +82,8 @@ def make_levels(
         volumes = FineVolumes(fine, planes, box, topology, caps)
         bodies = SmallBodies(fine, topology)
     with clock("measure"):
-        to_fine = of_all = Nearest(fine, lod.samples)
+        of_all = Nearest(fine, lod.samples)
+    to_fine: Nearest | None = of_all  # without bodies that are removed; None: not made yet
     # The vertex of `mesh` that stands for each fine vertex; -1: none does
     owners = np.arange(len(fine.positions), dtype=np.int32)
     gone = np.zeros(len(fine.positions), bool)
@@ -91,12 +92,12 @@ def make_levels(
         with clock("simplify"):
             small = bodies.find(length)
             if (small > gone).any():
-                gone = small
+                gone, to_fine = small, None
                 stay = ~gone[number[mesh.triangles[:, 0]]]
-                used = np.unique(mesh.triangles[stay])
+                used, own = renumber(mesh.triangles[stay], len(number))
                 left = np.full(len(number), -1, np.int32)
                 left[used] = np.arange(len(used), dtype=np.int32)
-                mesh, number = compact(mesh, mesh.triangles[stay]), number[used]
+                mesh, number = Mesh(mesh.positions[used], own, mesh.normals[used]), number[used]
                 owners = _follow(owners, left)
                 topology = None
             topology = topology or find_topology(mesh.triangles, len(mesh.positions))
@@ -107,8 +108,7 @@ def make_levels(
         number, shown = number[simplified.vertices], kept.mesh
         owners = _follow(owners, simplified.owners)
         with clock("measure"):
-            if gone.any():
-                to_fine = of_all.without(gone)
+            to_fine = to_fine or of_all.without(gone)
             to_mesh = Nearest(shown, lod.samples, simplified.topology.twins)
             away, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
             # A coarser level never states a smaller distance, because viewers rely on the order,
