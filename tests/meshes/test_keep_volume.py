@@ -23,7 +23,9 @@ ERROR = 0.6
 def kept(fine: Mesh, planes: tuple[tuple[int, float], ...] = ()) -> tuple[Mesh, Mesh]:
     """Return the simplified mesh, and the same mesh with its volumes restored."""
     simple = simplify_without_defects(fine, planes, max_error_um=ERROR)
-    found = FineVolumes(fine, planes).keep(simple.mesh, simple.vertices, max_move_um=ERROR)
+    found = FineVolumes(fine, planes).keep(
+        simple.mesh, simple.vertices, simple.owners, max_move_um=ERROR
+    )
     assert found.defects.counts == find_defects(found.mesh, planes=planes).counts
     return simple.mesh, found.mesh
 
@@ -65,7 +67,8 @@ def test_no_vertex_leaves_the_common_box_of_tile_and_fine_mesh() -> None:
     box = np.array([-9.0, -9.0, -4.0]), np.array([9.0, 4.0, 9.0])
     bound, unbound = FineVolumes(fine, (), box), FineVolumes(fine, ())
     mesh, free = (
-        each.keep(simple.mesh, simple.vertices, max_move_um=ERROR).mesh for each in (bound, unbound)
+        each.keep(simple.mesh, simple.vertices, simple.owners, max_move_um=ERROR).mesh
+        for each in (bound, unbound)
     )
     low, high = fine.positions.min(axis=0), fine.positions.max(axis=0)
     assert free.positions[:, 2].min() < low[2] - 0.05
@@ -109,7 +112,7 @@ def test_a_body_s_missing_volume_is_measured_against_its_own_even_if_a_cut_opens
     simple = simplify_without_defects(fine, planes, max_error_um=ERROR)
     volumes, lacks_volume = FineVolumes(fine, planes), []
     for move in (0.01, 0.05, 0.1, 0.2, ERROR):
-        found = volumes.keep(simple.mesh, simple.vertices, max_move_um=move)
+        found = volumes.keep(simple.mesh, simple.vertices, simple.owners, max_move_um=move)
         for is_half, whole in ((True, 250 / 3 * np.pi), (False, 500 / 3 * np.pi)):
             before, after = (
                 enclosed_volume(replace(mesh, triangles=mesh.triangles[
@@ -129,7 +132,7 @@ def test_unchanged_bodies_keep_their_moves_and_are_not_checked_again(
     fine = joined(crowd(), moved(ball(5.0, 60), (40.0, 0.0, 0.0)))
     volumes, simplifier = FineVolumes(fine, ()), Simplifier(fine, ())
     before = simplifier.simplify(ERROR)
-    first = volumes.keep(before.mesh, before.vertices, max_move_um=ERROR)
+    first = volumes.keep(before.mesh, before.vertices, before.owners, max_move_um=ERROR)
     chosen = np.zeros(label_components(fine.triangles, len(fine.positions)).max() + 1, bool)
     chosen[-1] = True
     after = simplifier.simplify(ERROR / 4, chosen)
@@ -143,7 +146,9 @@ def test_unchanged_bodies_keep_their_moves_and_are_not_checked_again(
 
     monkeypatch.setattr(keep_volume, "find_defects", count_fresh)
     earlier = EarlierLevel(first, before.vertices, after.changed)
-    second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
+    second = volumes.keep(
+        after.mesh, after.vertices, after.owners, max_move_um=ERROR, earlier=earlier
+    )
     assert counts[0] == is_far[after.mesh.triangles[:, 0]].sum()
     assert len(counts) == 1
     was_far = before.mesh.positions[:, 0] > 30
@@ -158,10 +163,12 @@ def test_defects_of_unchanged_bodies_are_reported_again() -> None:
     fine = joined(one, moved(one, (6.0, 0.0, 0.0)), moved(one, (40.0, 0.0, 0.0)))
     volumes, simplifier = FineVolumes(fine, ()), Simplifier(fine, ())
     before = simplifier.simplify(ERROR)
-    first = volumes.keep(before.mesh, before.vertices, max_move_um=ERROR)
+    first = volumes.keep(before.mesh, before.vertices, before.owners, max_move_um=ERROR)
     after = simplifier.simplify(ERROR / 4, np.array([False, False, True]))
     earlier = EarlierLevel(first, before.vertices, after.changed)
-    second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
+    second = volumes.keep(
+        after.mesh, after.vertices, after.owners, max_move_um=ERROR, earlier=earlier
+    )
     assert first.defects.total > 0
     assert second.defects.counts == first.defects.counts
     assert after.fallbacks == 2
@@ -182,7 +189,9 @@ def test_a_body_that_crosses_an_unmoved_body_is_not_moved_either(
 ) -> None:
     monkeypatch.setattr(keep_volume, "TRIES", 0)
     simple = simplify_without_defects(shells(seed), (), max_error_um=1.0)
-    found = FineVolumes(shells(seed), ()).keep(simple.mesh, simple.vertices, max_move_um=1.0)
+    found = FineVolumes(shells(seed), ()).keep(
+        simple.mesh, simple.vertices, simple.owners, max_move_um=1.0
+    )
     assert find_defects(found.mesh).total == 0
     moved_to = simple.mesh.positions + found.moves
     np.testing.assert_allclose(found.mesh.positions, moved_to, atol=1e-5)

@@ -96,7 +96,9 @@ def test_a_copy_with_defects_after_simplification_stays_unsimplified(
         damaged = Mesh(mesh.positions, mesh.triangles[1:], mesh.normals)
         topology = find_topology(damaged.triangles, len(damaged.positions))
         everywhere = np.ones(len(mesh.positions), bool)
-        return Simplified(damaged, topology, np.flatnonzero(everywhere), everywhere, 0, 0)
+        vertices = np.flatnonzero(everywhere)
+        owners = vertices.astype(np.int32)
+        return Simplified(damaged, topology, vertices, owners, everywhere, 0, 0)
 
     simple = close(distance, REGION)
     monkeypatch.setattr(closed_copy, "simplify_without_defects", spoil)

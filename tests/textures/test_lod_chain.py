@@ -177,7 +177,7 @@ def test_bodies_without_space_for_their_volume_are_simplified_less(
         faces.append([len(lod.mesh.triangles) for lod in lods])
         assert {kind for lod in lods for kind in kinds(find_defects(lod.mesh))} == set()
     assert min(volumes[0]) > 0.99
-    assert min(volumes[1]) < 0.97
+    assert min(volumes[1]) < 0.98
     assert faces[0][:2] == faces[1][:2]  # nothing changes while all have space
     assert faces[0][2] > faces[1][2]
     monkeypatch.setattr(lod_chain, "FINER", (0.0,))  # as many triangles as the level before
@@ -213,8 +213,9 @@ def test_coarser_levels_have_the_values_of_the_finest() -> None:
         assert lod.normal_map is None
         assert lod.baked is not None
         assert lod.baked.reason == "maps were not requested"
-        wanted = lod.mesh.positions[:, 2] / 8 + 0.5  # vertices moved a little to keep the volume
-        np.testing.assert_allclose(lod.baked.openness / 255, wanted, atol=0.03)
+        wanted = lod.mesh.positions[:, 2] / 8 + 0.5
+        # Vertices have moved by at most the level's error, and values are rounded to a byte.
+        np.testing.assert_allclose(lod.baked.openness / 255, wanted, atol=0.3 / 8 + 1 / 255)
 
 
 def test_the_enclosed_share_is_measured() -> None:

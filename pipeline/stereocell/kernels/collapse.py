@@ -65,6 +65,7 @@ from stereocell.kernels.quadrics import CLASSES, NEVER, SURE, add_plane, class_o
 from stereocell.kernels.ring_checks import check_normals, measure_ring, measure_stray
 from stereocell.kernels.rings import NEIGHBOURS, Flags, Mesh, Ring, make_mesh, make_ring
 from stereocell.kernels.surface_rings import fill_fans, find_cheapest_in_fan, stamp_fan
+from stereocell.kernels.triangle_rows import rename, rename_back
 from stereocell.kernels.triangles import Points
 
 PASSES = 4  # largest number of passes over one class of cost; for the last class, it is LAST
@@ -132,7 +133,7 @@ def collapse(
     place = np.empty(n, np.int32)
     place[order] = np.arange(n, dtype=np.int32)
     turns = order_triangles(triangles, place)
-    ordered = place[triangles[turns]]
+    ordered = rename(place, triangles, turns)
     mesh = make_mesh(
         n,
         m,
@@ -142,9 +143,7 @@ def collapse(
     )
     fill_fans(mesh, ordered, locked[order])
     corners, left, made = _run(mesh, at[order], ordered, place[past], limits)
-    result, is_left = np.empty((m, 3), np.int32), np.empty(m, bool)
-    is_left[turns] = left
-    result[turns] = order[corners]
+    result, is_left = rename_back(order, corners, turns, left)
     return result, is_left, order[made]
 
 

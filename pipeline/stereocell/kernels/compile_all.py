@@ -51,11 +51,26 @@ from stereocell.kernels.level_sums import (
 )
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.nearest import find_nearest, find_sides
+from stereocell.kernels.placement import (
+    find_places,
+    follow_moves,
+    move_along,
+    shorten_moves,
+    sum_planes,
+)
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.solid_counts import count_inside
+from stereocell.kernels.triangle_rows import (
+    differ,
+    rename,
+    rename_back,
+    repeat_a_corner,
+    share_a_plane,
+    touch,
+)
 from stereocell.kernels.union_find import label_pairs
 from stereocell.kernels.value_counts import count_values
 from stereocell.kernels.vdb_leaves import VOXELS, cut_leaves
@@ -99,6 +114,16 @@ def compile_of_meshes() -> None:
     bits, errors = np.zeros(4, np.uint8), np.full(4, 0.1)
     order_triangles(triangles, order_vertices(at))
     nothing = np.zeros((0, 2), np.int32)
+    follow_moves(nothing, 4)
+    moves = find_places(sum_planes(at, triangles, labels, at), 0.1, 0.1)
+    shorten_moves(at, triangles, moves, 0.9, 4)
+    move_along(at.copy(), moves, errors, at, 0.1, at[0], at[1])
+    for each in (triangles, triangles.astype(np.uint32)):
+        touch(flags, each)
+        differ(each, each)
+    repeat_a_corner(triangles)
+    share_a_plane(bits, triangles)
+    rename_back(labels, rename(labels, triangles, labels), labels, flags)
     left, _, _ = collapse(at, triangles, flags, bits, errors, 3.0, 0.9, nothing)
     flip_edges(at, left, flags, bits, bits, errors, 0.9)
     orders = find_orders(triangles, 4)

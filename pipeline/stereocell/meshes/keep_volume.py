@@ -1,8 +1,9 @@
-"""Restore the volume of each body of a simplified mesh: vertices move along their normals.
+"""Place the vertices of a simplified mesh, and restore the volume of each of its bodies.
 
 Simplification keeps some of the fine surface's vertices. Flat triangles between the vertices of a
-round body lie inside of it, so coarse levels would lose a third of a body's volume. Here all
-vertices of a body move outward by one distance, until its volume is that of the fine body or the
+round body lie inside of it, so coarse levels would lose a third of a body's volume. Here each
+vertex first moves to its place near the fine surface (meshes/place_vertices.py). Then all vertices
+of a body move along their normals by one distance, until its volume is that of the fine body or the
 distance reaches its bound.
 
 - The move fades out towards a cut, so that vertices of the cut keep their exact position and no
@@ -29,6 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.half_edges import measure_volumes, sum_gains, sum_normals
+from stereocell.kernels.placement import move_along
+from stereocell.kernels.triangle_rows import touch
+from stereocell.meshes.place_vertices import FinePlanes
 from stereocell.meshes.validity import (
     Defects,
     Topology,
@@ -112,6 +116,7 @@ class FineVolumes:
     ) -> None:
         topology = topology or find_topology(mesh.triangles, len(mesh.positions))
         self._label, count = topology.bodies
+        self._fine_planes = FinePlanes(mesh, topology.corners, caps)
         self._planes, self._caps = planes, caps
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         self._origin = (low.astype(np.float64) + high) / 2
@@ -137,6 +142,7 @@ class FineVolumes:
         self,
         mesh: Mesh,
         vertices: NDArray[np.int64],
+        owners: NDArray[np.int32],
         *,
         max_move_um: float,
         topology: Topology | None = None,
@@ -145,6 +151,7 @@ class FineVolumes:
         """Return a level of detail whose bodies have the volumes of the fine mesh's bodies.
 
         vertices     int64 (n,), index of each vertex in the fine mesh
+        owners       int32, the vertex that stands for each vertex of the fine mesh; -1: none does
         max_move_um  largest distance of a move
         topology     topology of the level's mesh; None: it is computed
         earlier      an earlier result, valid for all bodies that have not changed
@@ -156,6 +163,7 @@ class FineVolumes:
         wanted = self._volume[of_fine]
         start = mesh.positions.astype(np.float64)
         whole = _fade(mesh, topology, planes, FADE * max_move_um)
+        places = self._fine_planes.find_moves(start, triangles, owners, max_move_um)
         share, size = whole.copy(), np.bincount(label, minlength=count)
         fresh = np.ones(len(triangles), bool)
         if earlier is not None:
@@ -164,8 +172,10 @@ class FineVolumes:
             share[same] = earlier.kept.share[place]
             # Triangles in earlier defects are checked again.
             was_faulty = np.isin(vertices, earlier.at_fault)
-            fresh = np.asarray((earlier.changed | was_faulty)[triangles].any(axis=1))
-        moves = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
+            fresh = touch(earlier.changed | was_faulty, triangles)
+        moves = self._find_moves(
+            start, triangles, (label, count), wanted, share, max_move_um, places
+        )
         if earlier is not None:
             moves[same] = earlier.kept.moves[place]
         placed: Mesh | None = None
@@ -178,7 +188,7 @@ class FineVolumes:
                 # Only triangles that moved, or were in a defect, are checked again.
                 other = (positions != placed.positions).any(axis=1)
                 other[faulty] = True
-                fresh = other[mesh.triangles].any(axis=1)
+                fresh = touch(other, triangles)
             placed = replace(mesh, positions=positions)
             defects = find_defects(placed, planes=planes, fresh=fresh, topology=topology)
             faulty = defects.vertices(mesh.triangles)
@@ -195,7 +205,9 @@ class FineVolumes:
                 share[faulty] *= np.where(share[faulty] > MIN_WAY * whole[faulty], SHORTENING, 0.0)
             eased = np.divide(share, before, out=np.zeros_like(share), where=before > 0)[:, None]
             few = np.bincount(label, whole - share, count) < FEW * size
-            moved = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
+            moved = self._find_moves(
+                start, triangles, (label, count), wanted, share, max_move_um, places
+            )
             moves = np.where(few[label][:, None], moves * eased, moved)
         assert placed is not None
         missing = wanted - self._measure(start + moves, triangles, label, count)
@@ -210,16 +222,19 @@ class FineVolumes:
         wanted: Points,
         share: Points,
         max_move_um: float,
+        places: Points,
     ) -> Points:
         """Return the moves of the vertices, (n, 3), that give each body its volume.
 
         start   float64 (n, 3), positions before the move
+        places  moves (n, 3) that bring the vertices nearer to the fine surface
         bodies  body of each vertex, and the number of bodies
         wanted  volumes that the bodies should have, um^3
         share   share of the move that each vertex makes
         """
         label, count = bodies
-        at, moved = start.copy(), np.zeros(count)
+        at = np.clip(start + places * share[:, None], self._low, self._high)
+        moved = np.zeros(count)
         flat = [(axis, start[:, axis] == np.float32(value)) for axis, value in self._caps]
         for _ in range(STEPS):
             missing = wanted - self._measure(at, triangles, label, count)
@@ -230,7 +245,7 @@ class FineVolumes:
             step = np.divide(missing, gain, out=np.zeros(count), where=gain > 1e-12)
             step = np.clip(moved + step, -max_move_um, max_move_um) - moved
             moved += step
-            at = np.clip(at + ways * step[label][:, None], self._low, self._high)
+            move_along(at, ways, step[label], start, max_move_um, self._low, self._high)
         return at - start
 
 

@@ -26,15 +26,16 @@ FEW = 20
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Corners = NDArray[np.integer]  # (m, 3)
 
 
 def find_crossings(
-    positions: Points, triangles: Indices, *, fresh: NDArray[np.bool_] | None = None
+    positions: Points, triangles: Corners, *, fresh: NDArray[np.bool_] | None = None
 ) -> Indices:
     """Return the pairs of triangles that meet away from common corners, int64 (n, 2), sorted.
 
     positions  float64 (n, 3)
-    triangles  int64 (m, 3), each with three different corners that are not on a line. Other
+    triangles  integers (m, 3), each with three different corners that are not on a line. Other
                triangles have no plane, and the caller must leave them out.
     fresh      bool (m,); only pairs with a fresh triangle are returned. None: all pairs
     """
@@ -49,7 +50,7 @@ def find_crossings(
     return _find_crossings(positions, triangles, fresh)
 
 
-def _find_crossings(positions: Points, triangles: Indices, fresh: NDArray[np.bool_]) -> Indices:
+def _find_crossings(positions: Points, triangles: Corners, fresh: NDArray[np.bool_]) -> Indices:
     corners = np.ascontiguousarray(triangles, np.int32)
     grid = make_grid(positions, corners)
     pairs = find_candidates(
@@ -71,13 +72,13 @@ def _find_crossings(positions: Points, triangles: Indices, fresh: NDArray[np.boo
     return np.unique(np.sort(np.concatenate([apart, near]), axis=1), axis=0)
 
 
-def _apart(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
+def _apart(positions: Points, triangles: Corners, pairs: Indices) -> Indices:
     """Return those pairs (n, 2) of triangles without common corners that meet."""
     if not len(pairs):
         return pairs
     part = np.unique(pairs)
     _, found, _ = predicates.find_self_intersections(
-        positions, np.ascontiguousarray(triangles[part])
+        positions, np.ascontiguousarray(triangles[part], np.int64)
     )
     crossing = part[found.reshape(-1, 2)]
     numbers = (np.sort(some, axis=1) @ [len(triangles), 1] for some in (pairs, crossing))
@@ -125,18 +126,18 @@ def are_collinear(a: Points, b: Points, c: Points) -> NDArray[np.bool_]:
     return flat
 
 
-def find_flat(positions: Points, triangles: Indices) -> Indices:
+def find_flat(positions: Points, triangles: Corners) -> Indices:
     """Return the triangles whose corners lie on a line, exactly (n,). See `find_crossings`."""
     maybe = np.flatnonzero(find_maybe_flat(positions, np.ascontiguousarray(triangles, np.int32)))
     return maybe[are_collinear(*positions[triangles[maybe]].transpose(1, 0, 2))]
 
 
-def _share_corners(triangles: Indices, pairs: Indices) -> NDArray[np.bool_]:
+def _share_corners(triangles: Corners, pairs: Indices) -> NDArray[np.bool_]:
     first, second = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
     return (first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
 
 
-def _meet(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
+def _meet(positions: Points, triangles: Corners, pairs: Indices) -> Indices:
     """Return those pairs of triangles with common corners that also meet elsewhere."""
     same = triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]
     common = same.sum(axis=(1, 2))
@@ -159,7 +160,7 @@ def _meet(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
 
 
 def _folded(
-    positions: Points, triangles: Indices, pairs: Indices, same: NDArray[np.bool_]
+    positions: Points, triangles: Corners, pairs: Indices, same: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Return which pairs with a common edge are coplanar and lie on the same side of it."""
     rows = np.arange(len(pairs))

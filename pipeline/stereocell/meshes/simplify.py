@@ -91,9 +91,10 @@ def simplify_part(
     used, own = renumber(triangles, len(mesh.positions))
     if not len(used):
         return triangles, np.zeros(0, bool), NOTHING
-    at = mesh.positions[used].astype(np.float64)
+    positions = mesh.positions.take(used, axis=0)
+    at = positions.astype(np.float64)
     at -= (at.min(axis=0) + at.max(axis=0)) / 2
-    bits, of_caps = (find_planes(mesh.positions[used], some) for some in (planes, caps))
+    bits, of_caps = (find_planes(positions, some) for some in (planes, caps))
     sharpest, sharp = np.cos(np.radians([SHARPEST_DEG, FLIP_DEG])).tolist()
     number = np.zeros(len(mesh.positions), np.int32)
     number[used] = np.arange(len(used), dtype=np.int32)
@@ -111,7 +112,7 @@ def simplify_part(
     kept = corners[left]
     flip_edges(at, kept, locked[used], bits, of_caps, errors[used], sharp)
     corners[left] = kept
-    return used.astype(np.uint32)[corners], left, used.astype(np.int32)[moves]
+    return used.astype(np.uint32).take(corners), left, used.astype(np.int32)[moves]
 
 
 def find_planes(positions: NDArray[np.float32], planes: tuple[Plane, ...]) -> NDArray[np.uint8]:

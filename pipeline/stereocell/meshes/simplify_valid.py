@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from stereocell.kernels.half_edges import measure_sides
+from stereocell.kernels.placement import follow_moves
+from stereocell.kernels.triangle_rows import differ, touch
 from stereocell.meshes.simplify import NOTHING, Moves, find_errors, renumber, simplify_part
 from stereocell.meshes.validity import Defects, Topology, find_defects, find_topology
 from stereocell.model.lattice import Plane
@@ -40,6 +42,8 @@ class Simplified:
 
     topology          topology of the simplified mesh
     vertices          int64 (k,), index of each vertex in the given mesh, rising
+    owners            int32 (n,), the vertex (0..k-1) that stands for each vertex of the given mesh;
+                      -1: none does
     changed           bool (k,), vertices of bodies that were simplified in this call
     simplified_again  number of bodies that were simplified more than once
     fallbacks         number of bodies that kept their given surface
@@ -48,6 +52,7 @@ class Simplified:
     mesh: Mesh
     topology: Topology
     vertices: NDArray[np.int64]
+    owners: NDArray[np.int32]
     changed: NDArray[np.bool_]
     simplified_again: int
     fallbacks: int
@@ -126,7 +131,7 @@ class Simplifier:
             many = worst & (hits > np.maximum(MANY * size, COSTLY))
             ended = (worst & (rounds == ROUNDS)) | (many & (halvings == HALVINGS))
             # Crossings of given triangles cannot be repaired by simplifying less.
-            given = (self._corners == mesh.triangles).all(axis=1)[self._left]
+            given = ~differ(self._corners, mesh.triangles)[self._left]
             as_given = defects.crossings[given[defects.crossings].all(axis=1)]
             ended[body[used[own[as_given, 0]]]] = True
             ended &= worst
@@ -153,11 +158,14 @@ class Simplifier:
             self._redone |= chosen
             changed |= chosen
         again, fallbacks = int((self._redone & ~self._kept).sum()), int(self._kept.sum())
-        return Simplified(draft, found, used, changed[body[used]], again, fallbacks)
+        place = np.full(len(mesh.positions), -1, np.int32)
+        place[used] = np.arange(len(used), dtype=np.int32)
+        owners = place[follow_moves(self._moves, len(place))]
+        return Simplified(draft, found, used, owners, changed[body[used]], again, fallbacks)
 
     def _are_faulty(self) -> NDArray[np.bool_]:
         """Return which of all triangles touch a defect of the last draft, bool (m,)."""
-        return np.asarray(self._faulty[self._corners].any(axis=1))
+        return touch(self._faulty, self._corners)
 
     def _simplify_again(
         self, chosen: NDArray[np.bool_], *, repeats_moves: bool = False
@@ -193,7 +201,7 @@ class Simplifier:
     ) -> NDArray[np.bool_]:
         rows = np.flatnonzero(chosen[self._body_of])
         other = np.zeros(len(self._corners), bool)
-        other[rows] = ~self._left[rows] | (corners != self._corners[rows]).any(axis=1)
+        other[rows] = ~self._left[rows] | differ(corners, self._corners[rows])
         self._corners[rows], self._left[rows] = corners, left
         stay = ~chosen[self._bodies[0][self._moves[:, 0]]]
         self._moves = np.concatenate([self._moves[stay], moves])

@@ -22,7 +22,9 @@ from stereocell.kernels.half_edges import (
     match_twins,
     measure_windings,
 )
+from stereocell.kernels.triangle_rows import repeat_a_corner, share_a_plane
 from stereocell.meshes.self_intersections import find_crossings, find_flat
+from stereocell.meshes.simplify import find_planes
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
@@ -131,24 +133,24 @@ def find_defects(
     >>> {k: n for k, n in find_defects(Mesh(corners, faces[:3], corners)).counts.items() if n}
     {'open': 3}
     """
-    triangles = mesh.triangles.astype(np.int64)
+    topology = topology or find_topology(mesh.triangles, len(mesh.positions))
+    triangles, rim = topology.corners, topology.rim
     positions = mesh.positions.astype(np.float64)
-    degenerate = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    degenerate = repeat_a_corner(triangles)
     degenerate[find_flat(positions, triangles)] = True
     used = np.flatnonzero(~degenerate)
-    topology = topology or find_topology(triangles, len(mesh.positions))
-    rim = topology.rim
-    crossings = find_crossings(
-        positions, triangles[used], fresh=None if fresh is None else fresh[used]
-    )
+    if len(used) < len(triangles):
+        triangles, fresh = triangles[used], None if fresh is None else fresh[used]
+    crossings = find_crossings(positions, triangles, fresh=fresh)
+    on_planes = find_planes(mesh.positions, planes)
     return Defects(
         degenerate=np.flatnonzero(degenerate),
-        open=rim[~_on_planes(mesh.positions, rim, planes)],
+        open=rim[(on_planes[rim[:, 0]] & on_planes[rim[:, 1]]) == 0],
         non_manifold_edges=np.unique(np.sort(topology.crowded, axis=1), axis=0),
         non_manifold_vertices=topology.non_manifold_vertices,
         inside_out=_inside_out(mesh, topology, planes),
         crossings=used[crossings],
-        in_cut_plane=np.flatnonzero(_on_planes(mesh.positions, triangles, planes)),
+        in_cut_plane=np.flatnonzero(share_a_plane(on_planes, topology.corners)),
     )
 
 
@@ -170,16 +172,6 @@ def border(triangles: NDArray[np.integer]) -> Indices:
     twins = match_twins(corners, int(corners.max(initial=-1)) + 1)
     lone = _ends_of(corners.astype(np.int64), np.flatnonzero(twins < 0))
     return lone[np.lexsort(lone.T[::-1])]
-
-
-def _on_planes(
-    positions: NDArray[np.float32], corners: Indices, planes: tuple[Plane, ...]
-) -> NDArray[np.bool_]:
-    """Return which edges (n, 2) or triangles (n, 3) lie exactly in one of the planes."""
-    on = np.zeros(len(corners), bool)
-    for column, value in planes:
-        on |= (positions[corners, column] == np.float32(value)).all(axis=1)
-    return on
 
 
 def _ends_of(triangles: Indices, half_edges: NDArray[np.integer]) -> Indices:

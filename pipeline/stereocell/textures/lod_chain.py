@@ -1,10 +1,10 @@
 """Make all levels of detail of one unit from its fine surface; validate and measure each of them.
 
 Each level is simplified from the one before, so that its vertices are a part of that level's. Then
-it gets its volume back (meshes/keep_volume.py). Bodies between near walls may have no space to
-grow. These are simplified less, and at last not at all, as long as the level hardly becomes larger.
-Rims do not change. Small bodies are removed as a whole if they would become thinner than the error
-(meshes/small_bodies.py).
+they move to places near the fine surface, and bodies get their volumes back
+(meshes/keep_volume.py). Bodies between near walls may have no space to grow. These are simplified
+less, and at last not at all, as long as the level hardly becomes larger. Rims do not change. Small
+bodies are removed as a whole if they would become thinner than the error (meshes/small_bodies.py).
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from stereocell.kernels.half_edges import measure_sharpest
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.keep_volume import Box, EarlierLevel, FineVolumes, RestoredLevel
 from stereocell.meshes.options import LodOptions
-from stereocell.meshes.simplify import compact
+from stereocell.meshes.simplify import renumber
 from stereocell.meshes.simplify_valid import Simplified, Simplifier
 from stereocell.meshes.small_bodies import SmallBodies
 from stereocell.meshes.validity import Topology, find_topology
@@ -82,27 +82,33 @@ def make_levels(
         volumes = FineVolumes(fine, planes, box, topology, caps)
         bodies = SmallBodies(fine, topology)
     with clock("measure"):
-        to_fine = of_all = Nearest(fine, lod.samples)
+        of_all = Nearest(fine, lod.samples)
+    to_fine: Nearest | None = of_all  # without bodies that are removed; None: not made yet
+    # The vertex of `mesh` that stands for each fine vertex; -1: none does
+    owners = np.arange(len(fine.positions), dtype=np.int32)
     gone = np.zeros(len(fine.positions), bool)
     for level, error in list(enumerate(lod.errors))[first:]:
         length = error * min(spacing_um)
         with clock("simplify"):
             small = bodies.find(length)
             if (small > gone).any():
-                gone = small
+                gone, to_fine = small, None
                 stay = ~gone[number[mesh.triangles[:, 0]]]
-                used = np.unique(mesh.triangles[stay])
-                mesh, number = compact(mesh, mesh.triangles[stay]), number[used]
+                used, own = renumber(mesh.triangles[stay], len(number))
+                left = np.full(len(number), -1, np.int32)
+                left[used] = np.arange(len(used), dtype=np.int32)
+                mesh, number = Mesh(mesh.positions[used], own, mesh.normals[used]), number[used]
+                owners = _follow(owners, left)
                 topology = None
             topology = topology or find_topology(mesh.triangles, len(mesh.positions))
         simplifier = Simplifier(mesh, planes, topology, caps)
-        simplified, kept = _simplify(simplifier, topology, number, volumes, length, clock)
+        simplified, kept = _simplify(simplifier, topology, (number, owners), volumes, length, clock)
         # The earlier mesh and topology take much memory, which this frees.
         mesh, topology = simplified.mesh, simplified.topology
         number, shown = number[simplified.vertices], kept.mesh
+        owners = _follow(owners, simplified.owners)
         with clock("measure"):
-            if gone.any():
-                to_fine = of_all.without(gone)
+            to_fine = to_fine or of_all.without(gone)
             to_mesh = Nearest(shown, lod.samples, simplified.topology.twins)
             away, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
             # A coarser level never states a smaller distance, because viewers rely on the order,
@@ -132,7 +138,7 @@ def make_levels(
 def _simplify(
     simplifier: Simplifier,
     topology: Topology,
-    number: NDArray[np.int64],
+    ancestry: tuple[NDArray[np.int64], NDArray[np.int32]],
     volumes: FineVolumes,
     error_um: float,
     clock: Clock,
@@ -141,8 +147,10 @@ def _simplify(
 
     simplifier  holds the next finer level, which it simplifies
     topology    topology of the next finer level
-    number      index of each vertex of the next finer level in the fine mesh
+    ancestry    index of each vertex of the next finer level in the fine mesh, and the vertex of the
+                next finer level that stands for each fine one; -1: none does
     """
+    number, owners = ancestry
     with clock("simplify"):
         simplified = simplifier.simplify(error_um)
     count = len(simplified.mesh.triangles)
@@ -154,6 +162,7 @@ def _simplify(
             kept = volumes.keep(
                 simplified.mesh,
                 own,
+                _follow(owners, simplified.owners),
                 max_move_um=error_um,
                 topology=simplified.topology,
                 earlier=earlier,
@@ -170,6 +179,17 @@ def _simplify(
         earlier = EarlierLevel(kept, own, simplified.changed)
     assert best is not None
     return best
+
+
+def _follow(owners: NDArray[np.int32], onto: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the vertex that stands for each fine vertex, after vertices became others.
+
+    owners  int32 (n,), the vertex that stood for each fine vertex before; -1: none did
+    onto    int32 (k,), the vertex that each of these vertices became; -1: none
+    """
+    followed = onto[owners]
+    followed[owners < 0] = -1
+    return followed
 
 
 def sharpest_angle(mesh: Mesh) -> float:
