@@ -18,7 +18,7 @@ class BuildUnit(Step[Unit]):
     painted  channel that is painted on the surface; None: none is
     """
 
-    VERSION: ClassVar[int] = 2
+    VERSION: ClassVar[int] = 3
     FORM: ClassVar[UnitFolder] = UNIT_FOLDER
 
     voxels: Voxels
