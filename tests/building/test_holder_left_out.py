@@ -11,7 +11,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.tile_content import APRON
 from stereocell.planning.settings import load
 from stereocell.preview.iso_value import preview
-from stereocell.steps.unit_files import load_measured, load_volume
+from stereocell.steps.unit_files import load_voxels
 from support import nifti_files
 from support.validators import make_assets
 
@@ -46,10 +46,10 @@ def _voxels(out: Path) -> tuple[NDArray[np.uint8], NDArray[np.int16]]:
     (name, key), *_ = folder.index().items()
     tile, channel = name.split("/")
     unit = folder.unit_dir(f"{tile}/{channel}", key)
-    measured = load_measured(unit)
+    volume, measured = load_voxels(unit)
     assert measured is not None
     inner = slice(APRON, -APRON)
-    return load_volume(unit)[inner, inner, inner], measured[inner, inner, inner]
+    return volume[inner, inner, inner], measured[inner, inner, inner]
 
 
 def _shares(voxels: NDArray[np.int16], value: int) -> float:

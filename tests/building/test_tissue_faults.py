@@ -53,7 +53,7 @@ FIRST_RUN = [
     ("os.rename", "/plan.json"),
     ("os.rename", "/provenance.json"),
     ("os.rename", "/units/survey.json"),
-    ("open", "/volume.npy"),
+    ("open", "/voxels.npz"),
     ("os.rename", "/units/done.json"),
     ("os.rename", "/stage/specimen.usdz"),
     ("os.rename", "/.bundle.old"),

@@ -69,13 +69,20 @@ def test_an_edited_window_gives_the_volumes_of_a_build_with_it(
     assert volumes(edited) != volumes(built / "bundle")
 
 
+def _read(record: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(record.read_text("utf-8"))
+    return content
+
+
 @pytest.mark.slow
 def test_8_bits_leave_out_measured_voxels_and_the_log_states_their_size(
     built: Path, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     small = build(source, tmp_path / "small", "--bits", "8")
     assert "voxels as measured" not in capsys.readouterr().err
-    assert not list(small.rglob("measured.npy"))
+    records = (map(_read, out.rglob("unit.json")) for out in (built, small))
+    keeps = [{record["window"] is not None for record in found} for found in records]
+    assert keeps == [{True}, {False}]
     kept, alone = (
         {path: data for path, data in files(out / "bundle").items() if path.suffix != ".json"}
         for out in (built, small)

@@ -9,7 +9,7 @@ from stereocell.engine.run import Engine
 from stereocell.formats import tiles3d
 from stereocell.formats.tiles3d import content_hash
 from stereocell.formats.tiles3d_walk import walk
-from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
+from stereocell.verify.bundle_against_stage import BundleTask, compare_part
 from stereocell.verify.formats import check
 from support import spheres
 from support.bundles import write_bundle
@@ -65,7 +65,8 @@ def test_other_tiles_are_not_opened(bundle):
 
 
 def test_surfaces_in_an_external_tileset_are_compared_with_the_stage(made):
-    finding = compare_tile(BundleTask(made / "stage" / "stage.usda", made / "bundle", "r0_c0"))
+    task = BundleTask(made / "stage" / "stage.usda", made / "bundle", "r0_c0", "CD31")
+    finding = compare_part(task)
     assert (finding.surfaces, finding.problems) == (3, ())
 
 

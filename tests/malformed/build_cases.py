@@ -132,7 +132,7 @@ def _units() -> Iterator[Case]:
         yield _edited(
             f"key that {name}", "stage", DONE, _sealed(lambda c, k=key: dict.fromkeys(c, k))
         )
-    for file in ("unit.json", "volume.npy", "lod0.npz", "lod1.npz"):
+    for file in ("unit.json", "voxels.npz", "lod0.npz", "lod1.npz"):
         for way, spoil in {
             "cut": lambda p: cut(p, 0.6), "empty": lambda p: p.write_bytes(b""), "flipped": lambda p: flip(p, 3, 40), "lost": lambda p: p.unlink(),
             "its head flipped": lambda p: flip(p, 5, 10, 0, 120),
@@ -153,10 +153,10 @@ def _units() -> Iterator[Case]:
     }.items():
         content = head + text.encode().ljust(117) + b"\n" + bytes(64)
         yield _case(
-            f"volume.npy {name}",
+            f"voxels.npz {name}",
             "stage",
             lambda out, c=content: _every(
-                out / "units/r0_c0/F", "volume.npy", lambda p: p.write_bytes(c)
+                out / "units/r0_c0/F", "voxels.npz", lambda p: p.write_bytes(c)
             ),
         )
     for name, change in {

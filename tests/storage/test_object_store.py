@@ -173,7 +173,7 @@ def test_missing_and_unfinished_objects_are_made_again(
     fs = store.files()
     before = of_parts(marks(store, "bucket/there"))
     (unit,) = [
-        key for key in before if key.startswith("units/r0_c0/") and key.endswith("volume.npy")
+        key for key in before if key.startswith("units/r0_c0/") and key.endswith("voxels.npz")
     ]
     fs.rm(f"bucket/there/{unit}")
     fs.pipe_file("bucket/there/bundle/index.html", b"cut")
@@ -202,7 +202,7 @@ def test_flipped_bits_in_objects_are_reported_and_not_used(
     fs = store.files()
     before = of_parts(marks(store, "bucket/there"))
     (unit,) = [
-        key for key in before if key.startswith("units/r0_c0/") and key.endswith("volume.npy")
+        key for key in before if key.startswith("units/r0_c0/") and key.endswith("voxels.npz")
     ]
     (atlas,) = [key for key in before if key.startswith("stage/tiles/r0_c0/") and ".exr" in key]
     for key, phase in ((unit, "stage"), (atlas, "bundle")):
@@ -339,7 +339,7 @@ def test_reading_commands_do_not_remove_unfinished_objects(store: ObjectStore) -
     owner = {"process": os.getpid(), "machine": machine(), "start": start_of(os.getpid())}
     made = {
         "bucket/read/.lock": json.dumps(owner).encode(),
-        "bucket/read/units/r0_c0/F/.0123456789.deadbeef.partial/volume.npy": b"half",
+        "bucket/read/units/r0_c0/F/.0123456789.deadbeef.partial/voxels.npz": b"half",
         "bucket/read/plan.json": b"{}",
     }
     fs.pipe(made)

@@ -140,7 +140,7 @@ def test_the_same_input_in_any_order_gives_the_same_bytes(
     assert max(asked) == 4
     assert asset_digests(tmp_path / "out") == asset_digests(built)
     names = {Path(name).name for name in asset_digests(built)}
-    assert names >= {"unit.json", "lod0.npz", "volume.npy", "stage.usda", "manifest.json"}
+    assert names >= {"unit.json", "lod0.npz", "voxels.npz", "stage.usda", "manifest.json"}
     assert list((built / "units").rglob("seconds.json"))
 
 

@@ -30,7 +30,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
 # Names with a space and an apostrophe; the second channel has no surface.
 NAMES = ["Alice's F", "empty"]
 F = "Alice_x27_s_x20_F"
-UNIT_FILES = ["unit.json", "volume.npy", "lod0.npz", "closed.stl"]
+UNIT_FILES = ["unit.json", "voxels.npz", "lod0.npz", "closed.stl"]
 STAGE_FILES = [
     f"tiles/r0_c0/{F}.exr",
     f"tiles/r0_c0/{F}.vdb",
@@ -106,7 +106,7 @@ def test_flipped_bit_of_a_unit_is_named_by_check(out: Path, name: str, silent: b
     assert "run `stereocell units OUT`" in line.detail
 
 
-@pytest.mark.parametrize("name", sweep(UNIT_FILES, kept=["volume.npy"]))
+@pytest.mark.parametrize("name", sweep(UNIT_FILES, kept=["voxels.npz"]))
 def test_unit_with_a_flipped_bit_is_made_again(out: Path, built: Path, name: str) -> None:
     _flip(_unit(out) / name)
     _go_on(out)
@@ -414,12 +414,12 @@ def test_a_copy_with_new_times_is_hashed_once(
 ) -> None:
     out = shutil.copytree(built, tmp_path / "out")
     now = (_unit(out) / "unit.json").stat().st_mtime_ns + 10**9
-    for name in ("volume.npy", "lod0.npz"):
+    for name in ("voxels.npz", "lod0.npz"):
         os.utime(_unit(out) / name, ns=(now, now))
     hashed: list[Path] = []
     _count_hashed(hashed, monkeypatch)
     assert is_whole(_unit(out))
-    assert sorted(file.name for file in hashed) == ["lod0.npz", "volume.npy"]
+    assert sorted(file.name for file in hashed) == ["lod0.npz", "voxels.npz"]
     hashed.clear()
     assert is_whole(_unit(out))
     assert hashed == []

@@ -79,7 +79,7 @@ def _same(out: Path, built: Path) -> bool:
         "bundle/manifest.json",
         "bundle/channels/F_x20_body/r0_c0/lod0.glb",
         "report/index.html",
-        "UNIT/volume.npy",
+        "UNIT/voxels.npz",
     ],
 )
 def test_cut_file_is_made_again(out: Path, built: Path, name: str) -> None:
@@ -191,8 +191,8 @@ def test_used_out_names_the_flag_for_another_input(
 def test_stage_that_was_not_finished_is_not_exported(
     out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    whole = (_unit(out) / "volume.npy").read_bytes()
-    (_unit(out) / "volume.npy").write_bytes(whole[:200])
+    whole = (_unit(out) / "voxels.npz").read_bytes()
+    (_unit(out) / "voxels.npz").write_bytes(whole[:200])
     (out / "stage" / "stage.usda").unlink()
     assert main(["stage", str(out), "--workers", "0"]) == 1
     capsys.readouterr()
@@ -201,7 +201,7 @@ def test_stage_that_was_not_finished_is_not_exported(
         f"stage: began and did not finish: run `stereocell stage {out}`" in capsys.readouterr().err
     )
     assert main(["check", str(out)]) == 1
-    (_unit(out) / "volume.npy").write_bytes(whole)
+    (_unit(out) / "voxels.npz").write_bytes(whole)
     assert main(["stage", str(out), "--workers", "0"]) == 0
     assert main(["bundle", str(out), "--workers", "0"]) == 0
 

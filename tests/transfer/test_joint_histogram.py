@@ -153,3 +153,14 @@ def test_sampled_boxes_lie_apart_in_the_region_and_hold_the_requested_voxels() -
 def test_voxels_are_converted_to_eight_bits_by_the_window() -> None:
     values = np.array([-5.0, 0, 9.99, 10, 20, 30, 110, 111], np.float32)
     assert to_eight_bits(values, (10, 110)).tolist() == [0, 0, 0, 0, 26, 51, 255, 255]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int16])
+@pytest.mark.parametrize("window", [(0.0, 255.0), (17.3, 201.9), (-90.0, 60000.0)])
+def test_a_large_volume_of_whole_numbers_gets_the_bytes_of_its_values_as_floats(
+    dtype: type, window: tuple[float, float]
+) -> None:
+    info = np.iinfo(dtype)
+    voxels = np.random.default_rng(6).integers(info.min, info.max, (3, 150, 200), dtype)
+    expected = to_eight_bits(voxels.astype(np.float32), window)
+    np.testing.assert_array_equal(to_eight_bits(voxels, window), expected)

@@ -110,6 +110,7 @@ class Unit:
     reason    why there is no surface; empty: there is one
     seconds   seconds spent on each part of the work, such as `extract` (see Clock)
     measured  voxels of `volume` as measured; None: not kept, or equal to `volume`
+    window    values of `measured` that are 0 and 255 in `volume`
     objects   measurements of a label map's objects; None for a channel of an image
     cover     how much of the source's voxels the solid encloses; None: there is no level, or this
               is a label map
@@ -125,3 +126,4 @@ class Unit:
     measured: NDArray[Any] | None = None
     objects: ObjectFacts | None = None
     cover: Cover | None = None
+    window: tuple[float, float] = (0.0, 255.0)

@@ -67,7 +67,7 @@ class BuildObjects(Step[Unit]):
     painted     channel that is painted on the objects; None: none is
     """
 
-    VERSION: ClassVar[int] = 1
+    VERSION: ClassVar[int] = 2
     FORM: ClassVar[UnitFolder] = UNIT_FOLDER
 
     labels: Labels

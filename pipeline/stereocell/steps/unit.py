@@ -99,9 +99,10 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
         kept = cut_voxels(volume.voxels, given.lattice, given.holder)
         eight_bit = to_eight_bits(kept, given.intensity_window)
         measured = find_measured(kept, given)
+    window = given.intensity_window
     if given.iso is None:
         reason = "the channel has no iso-value"
-        return Unit((), None, eight_bit, reason, 0, 0, clock.seconds, measured)
+        return Unit((), None, eight_bit, reason, 0, 0, clock.seconds, measured, window=window)
 
     lattice = given.lattice.thinned(given.step)
     repaired, by_triangles = _repaired(volume, given, lattice, given.iso, clock)
@@ -111,9 +112,8 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
         cover = find_cover(volume, given, repaired)
     if not len(fine.triangles):
         reason = "no voxel crosses the iso-value"
-        return Unit(
-            (), None, eight_bit, reason, dropped, filled, clock.seconds, measured, None, cover
-        )
+        numbers = dropped, filled, clock.seconds
+        return Unit((), None, eight_bit, reason, *numbers, measured, None, cover, window)
     closed = None
     if given.options.closed_tiles:
         with clock("close"):
@@ -131,7 +131,8 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
         caps=lattice.cap_planes(),
         get_texturer=shading.texturer,
     )
-    return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds, measured, None, cover)
+    numbers = dropped, filled, clock.seconds
+    return Unit(lods, closed, eight_bit, "", *numbers, measured, None, cover, window)
 
 
 def find_surface(volume: Volume, given: UnitInput) -> tuple[Mesh, Cover | None]:

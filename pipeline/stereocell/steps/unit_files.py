@@ -1,11 +1,13 @@
-"""Save and load a unit as a folder: unit.json, volume.npy, and lodK.npz for each level of detail.
+"""Save and load a unit as a folder: unit.json, voxels.npz, and lodK.npz for each level of detail.
+
+The voxels are compressed, and stored once: as measured where these are kept, so that the 8-bit
+voxels are made from them again, or else in 8 bits.
 
 The same input gives the same bytes, except in seconds.json, which no other result depends on.
 unit.json lists the other files with their hashes, and holds a hash of itself. Each file is compared
 with its hash before it is read.
 """
 
-import io
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -15,6 +17,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.formats.packed_voxels import pack_voxels, unpack_voxels
 from stereocell.formats.stl import write_stl
 from stereocell.model.errors import OutputError
 from stereocell.model.mesh import Baked, Lod, Mesh, Quality, Spread
@@ -29,10 +32,11 @@ from stereocell.storage.json_files import (
     write_sealed,
 )
 from stereocell.storage.workspace import fetch
+from stereocell.transfer.joint_histogram import to_eight_bits
 
 SCHEMA, _SECONDS_SCHEMA = "units.schema.json#Unit", "units.schema.json#Seconds"
 _RECORD, _CLOSED, _SECONDS = "unit.json", "closed.stl", "seconds.json"
-_VOLUME, _MEASURED, _OBJECTS = "volume.npy", "measured.npy", "objects.npz"
+_VOXELS, _OBJECTS = "voxels.npz", "objects.npz"
 # Names in objects.npz of fields of ObjectFacts that are called otherwise there.
 _NAMES_IN_FILE = {"interface_objects": "walls", "interface_um2": "wall_um2"}
 
@@ -51,12 +55,9 @@ def save_unit(directory: Path, unit: Unit) -> None:
         for lod in unit.lods
     ]
     with replacing_folder(directory) as folder:
-        for name, voxels in ((_VOLUME, unit.volume), (_MEASURED, unit.measured)):
-            if voxels is not None:
-                # numpy's own writer does not report a full disk
-                buffer = io.BytesIO()
-                np.save(buffer, voxels)
-                (folder / name).write_bytes(buffer.getvalue())
+        voxels = unit.volume if unit.measured is None else unit.measured
+        if voxels is not None:
+            (folder / _VOXELS).write_bytes(pack_voxels(voxels))
         for level, lod in enumerate(unit.lods):
             np.savez(lod_file(folder, level), **_arrays(lod))
         if unit.objects is not None:
@@ -68,6 +69,7 @@ def save_unit(directory: Path, unit: Unit) -> None:
             "lods": lods,
             "closed": _describe_closed(unit.closed),
             "volume": [] if unit.volume is None else list(unit.volume.shape),
+            "window": None if unit.measured is None else [float(end) for end in unit.window],
             "fragments_dropped": unit.fragments_dropped,
             "cavities_filled": unit.cavities_filled,
             "cover": None if unit.cover is None else asdict(unit.cover),
@@ -170,17 +172,21 @@ def load_quality(stored: Mapping[str, Any]) -> Quality:
 
 
 def load_volume(directory: Path) -> NDArray[np.uint8]:
-    """Return the 8-bit voxels, uint8 (z, y, x), memory-mapped. Raises OutputError."""
-    return _load_voxels(directory, _VOLUME)
+    """Return the 8-bit voxels, uint8 (z, y, x). Raises OutputError for a damaged file."""
+    return load_voxels(directory)[0]
 
 
-def load_measured(directory: Path) -> NDArray[Any] | None:
-    """Return the voxels as measured (z, y, x), memory-mapped; None: not kept.
+def load_voxels(directory: Path) -> tuple[NDArray[np.uint8], NDArray[Any] | None]:
+    """Return the 8-bit voxels, uint8 (z, y, x), and those as measured; None: these are not kept.
 
     Raises OutputError for a damaged file.
     """
-    has_any = _MEASURED in load_record(directory)["files"]
-    return _load_voxels(directory, _MEASURED) if has_any else None
+    try:
+        voxels = unpack_voxels(_as_written(directory, directory / _VOXELS))
+    except (OSError, ValueError, LookupError, EOFError, RuntimeError, BadZipFile) as error:
+        raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
+    window = load_record(directory)["window"]
+    return (voxels, None) if window is None else (to_eight_bits(voxels, tuple(window)), voxels)
 
 
 def load_objects(directory: Path) -> ObjectFacts:
@@ -207,15 +213,6 @@ def _facts(objects: ObjectFacts) -> dict[str, NDArray[Any]]:
 
 def _names_of_facts() -> tuple[str, ...]:
     return tuple(field.name for field in fields(ObjectFacts))
-
-
-def _load_voxels(directory: Path, name: str) -> NDArray[Any]:
-    file = _as_written(directory, directory / name)
-    try:
-        voxels: NDArray[Any] = np.load(file, mmap_mode="r")
-    except (OSError, ValueError, EOFError) as error:
-        raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
-    return voxels
 
 
 def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:

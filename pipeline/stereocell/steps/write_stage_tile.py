@@ -14,8 +14,7 @@ from stereocell.steps.unit_files import (
     find_closed,
     is_whole,
     load_lods,
-    load_measured,
-    load_volume,
+    load_voxels,
 )
 from stereocell.storage.file_list import FileList
 from stereocell.usd import write_stage as stage_writer
@@ -118,13 +117,14 @@ class WriteStageTile(Step[StageTile]):
 
     def _content_of(self, unit: UnitPart, table: TableOfTile | None) -> ChannelContent:
         has_volume = table is None and unit.channel_id not in self.shared
+        volume, measured = load_voxels(unit.folder) if has_volume else (None, None)
         return ChannelContent(
             unit.channel_id,
             load_lods(unit.folder),
-            load_volume(unit.folder) if has_volume else None,
+            volume,
             unit.paint,
             find_closed(unit.folder),
-            load_measured(unit.folder) if has_volume else None,
+            measured,
             table.table if table else None,
             table.touching if table else None,
             unit.color,

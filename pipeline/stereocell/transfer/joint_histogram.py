@@ -124,12 +124,19 @@ def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[
     window  lowest and highest voxel value
     result  uint8, of the same shape
     """
-    low, high = window
     result = np.empty(voxels.shape, np.uint8)
+    table = None
+    if voxels.dtype in (np.uint8, np.uint16) and voxels.size > 1 << 16:
+        table = _scaled(np.arange(np.iinfo(voxels.dtype).max + 1, dtype=voxels.dtype), window)
     for z, plane in enumerate(voxels):  # one plane at a time, because float32 is large
-        share = (plane.astype(np.float32) - np.float32(low)) / np.float32(high - low)
-        result[z] = np.rint(np.clip(share, 0, 1) * 255)
+        result[z] = _scaled(plane, window) if table is None else table[plane]
     return result
+
+
+def _scaled(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
+    low, high = window
+    share = (voxels.astype(np.float32) - np.float32(low)) / np.float32(high - low)
+    return np.rint(np.clip(share, 0, 1) * 255).astype(np.uint8)
 
 
 def sample_boxes(region: Box, limit: int, largest: tuple[int, int, int] = SAMPLE_EDGE) -> list[Box]:

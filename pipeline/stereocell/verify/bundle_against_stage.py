@@ -1,19 +1,27 @@
-"""Compare a bundle with the stage that it was exported from, tile by tile, in decoded files.
+"""Compare a bundle with the stage that it was exported from, in decoded files.
+
+Each channel of each tile is a task of its own, so that a single tile occupies several workers.
 
 The comparisons are in bundle_manifest, bundle_surfaces and bundle_volumes.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from pxr import Usd
 
 from stereocell.bundle.edited_meshes import shown_lods
 from stereocell.bundle.manifest import read_manifest
 from stereocell.bundle.windowed_voxels import read_windowed
 from stereocell.bundle.write_tile import find_bounds
 from stereocell.bundle.write_transfer2d import count_tile
+from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_stage import loaded, open_stage
-from stereocell.usd.read_volume import read_volume
+from stereocell.usd.read_variants import TileChoice
+from stereocell.usd.read_volume import ComposedVolume, read_volume
 from stereocell.verify.bundle_files import find_differences
 from stereocell.verify.bundle_surfaces import compare_surfaces, surfaces_of, without_repeats
 from stereocell.verify.bundle_volumes import compare_volume, find_volume, placement_of
@@ -21,76 +29,98 @@ from stereocell.verify.bundle_volumes import compare_volume, find_volume, placem
 
 @dataclass(frozen=True, slots=True)
 class BundleTask:
-    """One tile of a bundle, and the stage that it was exported from."""
+    """A part of a bundle, and the stage that it was exported from.
+
+    channel_id  channel whose surfaces and volume in the tile are compared; None: the tile's own
+                entry in the manifest is compared
+    """
 
     stage_file: Path
     bundle: Path
     tile_id: str
+    channel_id: str | None
 
 
 @dataclass(frozen=True, slots=True)
-class TileFinding:
-    """The result of comparing one tile of a bundle with the stage.
+class PartFinding:
+    """The result of comparing a part of a bundle with the stage.
 
     worst   largest distance of a vertex from its position in the stage, in lattice steps
-    edits   a line for each surface that was edited by hand
-    joints  each volume's joint histogram of value and gradient, packed, by channel
+    edit    a line on the surface, if it was edited by hand; otherwise empty
+    joints  the volume's joint histogram of value and gradient, packed, by channel; empty without a
+            volume
     """
 
-    name: str
-    surfaces: int
-    volumes: int
-    worst: float
-    joints: dict[str, bytes]
     problems: tuple[str, ...]
-    edits: tuple[str, ...] = ()
+    surfaces: int = 0
+    worst: float = 0.0
+    edit: str = ""
+    joints: Mapping[str, bytes] = field(default_factory=dict)
 
 
-def compare_tile(task: BundleTask) -> TileFinding:
-    """Compare one tile's files with the composed stage. Raises StereoCellError if unreadable."""
+def bundle_tasks(stage_file: Path, bundle: Path, tiles: Sequence[str]) -> Iterator[BundleTask]:
+    """Yield the parts of a bundle: for each tile its entry, and each channel of the manifest.
+
+    The check of the manifest reports channels that are only in the stage or only in the manifest.
+    """
+    listed = {channel["id"] for channel in read_manifest(bundle)["channels"]}
+    channels = [one.id for one in read_appearances(open_stage(stage_file)) if one.id in listed]
+    for tile_id in tiles:
+        for channel_id in (None, *channels):
+            yield BundleTask(stage_file, bundle, tile_id, channel_id)
+
+
+def compare_part(task: BundleTask) -> PartFinding:
+    """Compare a part's files with the composed stage. Raises StereoCellError if unreadable."""
     manifest = read_manifest(task.bundle)
-    channels = {channel["id"]: channel for channel in manifest["channels"]}
-    problems: list[str] = []
-    edits: list[str] = []
-    joints: dict[str, bytes] = {}
-    surfaces = 0
-    worst = 0.0
     stage = open_stage(task.stage_file)
-    # The check of the manifest reports channels that the manifest lacks.
-    appearances = [
-        appearance for appearance in read_appearances(stage) if appearance.id in channels
-    ]
-    listed = next((one for one in manifest["tiles"] if one["id"] == task.tile_id), None)
+    appearances = {one.id: one for one in read_appearances(stage)}
     with loaded(stage, task.tile_id) as (tile, choice):
-        volumes = [read_volume(tile, appearance.id) for appearance in appearances]
-        if listed is not None:
-            low, high = find_bounds(tile, volumes)
-            bounds = {"min": list(low), "max": list(high)}
-            expected = {"representation": choice.representation, "bounds_um": bounds}
-            problems += find_differences(task.tile_id, listed, expected)
-        for appearance, composed in zip(appearances, volumes, strict=True):
-            channel, name = channels[appearance.id], f"{task.tile_id}/{appearance.id}"
-            shown = shown_lods(tile, appearance.id, choice.finest_lod)
-            lods = dict(without_repeats(shown.lods))
-            edits += [f"{name}: {shown.edit}"] if shown.edit else []
-            contents = dict(surfaces_of(task.bundle, channel, task.tile_id))
-            surfaces += len(contents)
-            apart, faults = compare_surfaces(contents, lods)
-            worst = max(worst, apart)
-            problems += [f"{name}: {fault}" for fault in faults]
-            entry = find_volume(task.bundle, channel, task.tile_id)
-            if (composed is None) != (entry is None):
-                which = ("stage", "bundle") if composed is None else ("bundle", "stage")
-                problems.append(f"{name}: the {which[0]} has no volume, but the {which[1]} has one")
-            elif composed is not None and entry is not None:
-                problems += find_differences(name, entry, placement_of(composed))
-                voxels = read_windowed(composed, appearance)
-                problems += [
-                    f"{name}: {fault}" for fault in compare_volume(task.bundle, entry, voxels)
-                ]
-                joints[appearance.id] = count_tile(
-                    voxels, composed, appearance.transfer_2d.gradient_max
-                )
-    return TileFinding(
-        task.tile_id, surfaces, len(joints), worst, joints, tuple(problems), tuple(edits)
-    )
+        if task.channel_id is None:
+            listed = {channel["id"] for channel in manifest["channels"]}
+            volumes = [read_volume(tile, one) for one in appearances if one in listed]
+            return PartFinding(_compare_entry(task.tile_id, manifest, tile, choice, volumes))
+        channel = next(one for one in manifest["channels"] if one["id"] == task.channel_id)
+        return _compare_channel(task, channel, appearances[task.channel_id], tile, choice)
+
+
+def _compare_entry(
+    tile_id: str,
+    manifest: dict[str, Any],
+    tile: Usd.Prim,
+    choice: TileChoice,
+    volumes: Sequence[ComposedVolume | None],
+) -> tuple[str, ...]:
+    listed = next((one for one in manifest["tiles"] if one["id"] == tile_id), None)
+    if listed is None:
+        return ()
+    low, high = find_bounds(tile, volumes)
+    bounds = {"min": list(low), "max": list(high)}
+    expected = {"representation": choice.representation, "bounds_um": bounds}
+    return tuple(find_differences(tile_id, listed, expected))
+
+
+def _compare_channel(
+    task: BundleTask,
+    channel: dict[str, Any],
+    appearance: ComposedAppearance,
+    tile: Usd.Prim,
+    choice: TileChoice,
+) -> PartFinding:
+    name = f"{task.tile_id}/{appearance.id}"
+    shown = shown_lods(tile, appearance.id, choice.finest_lod)
+    contents = dict(surfaces_of(task.bundle, channel, task.tile_id))
+    worst, faults = compare_surfaces(contents, dict(without_repeats(shown.lods)))
+    problems, joints = [f"{name}: {fault}" for fault in faults], {}
+    composed = read_volume(tile, appearance.id)
+    entry = find_volume(task.bundle, channel, task.tile_id)
+    if (composed is None) != (entry is None):
+        which = ("stage", "bundle") if composed is None else ("bundle", "stage")
+        problems.append(f"{name}: the {which[0]} has no volume, but the {which[1]} has one")
+    elif composed is not None and entry is not None:
+        problems += find_differences(name, entry, placement_of(composed))
+        voxels = read_windowed(composed, appearance)
+        problems += [f"{name}: {fault}" for fault in compare_volume(task.bundle, entry, voxels)]
+        joints[appearance.id] = count_tile(voxels, composed, appearance.transfer_2d.gradient_max)
+    edit = f"{name}: {shown.edit}" if shown.edit else ""
+    return PartFinding(tuple(problems), len(contents), worst, edit, joints)

@@ -24,7 +24,7 @@ from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import open_stage, tile_prims
 from stereocell.usd.stage_files import dependencies
-from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
+from stereocell.verify.bundle_against_stage import bundle_tasks, compare_part
 from stereocell.verify.bundle_manifest import compare_histograms, compare_manifest
 from stereocell.verify.check_line import CheckLine, raise_on
 from stereocell.verify.objects_against_source import compare_objects
@@ -216,13 +216,19 @@ def _compare_manifest(stage: Path, bundle: Path) -> str:
 
 
 def _compare_bundle(stage: Path, bundle: Path, engine: Engine) -> str:
-    tasks = [(name, BundleTask(stage, bundle, name)) for name in _tiles_in(stage)]
-    tiles = engine.run("bundle", compare_tile, tasks)
-    raise_on([problem for tile in tiles for problem in tile.problems])
-    raise_on(list(compare_histograms(bundle, [tile.joints for tile in tiles])))
-    surfaces, volumes = sum(tile.surfaces for tile in tiles), sum(tile.volumes for tile in tiles)
-    edits = "; ".join(line for tile in tiles for line in tile.edits)
-    worst = max((tile.worst for tile in tiles), default=0.0)
+    tasks = [
+        (task.tile_id if task.channel_id is None else f"{task.tile_id}/{task.channel_id}", task)
+        for task in bundle_tasks(stage, bundle, _tiles_in(stage))
+    ]
+    parts = engine.run("bundle", compare_part, tasks)
+    raise_on([problem for part in parts for problem in part.problems])
+    raise_on(list(compare_histograms(bundle, [part.joints for part in parts])))
+    surfaces, volumes = (
+        sum(part.surfaces for part in parts),
+        sum(bool(part.joints) for part in parts),
+    )
+    edits = "; ".join(part.edit for part in parts if part.edit)
+    worst = max((part.worst for part in parts), default=0.0)
     return (
         f"{surfaces} surfaces within {worst:.2f} lattice steps, their colours and maps; "
         f"{volumes} volumes, all voxels of all resolution levels, their bricks and histograms"
