@@ -175,7 +175,7 @@ $(PLACE)/out/bundle/manifest.json: $(PLACE)/out/stage/stage.usda $(VIEWER_DIST)
 	$(RUN) bundle --workers="$$WORKERS" -- "$$OUT"
 	@touch -c $@
 $(PLACE)/out/report/index.html: $(PLACE)/out/bundle/manifest.json
-	$(RUN) report -- "$$OUT"
+	$(RUN) report --workers="$$WORKERS" -- "$$OUT"
 	@touch -c $@
 
 check: setup ## Check OUT by its schemas and by the rules of USD, glTF and KTX2

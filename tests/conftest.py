@@ -87,7 +87,7 @@ def quick_builds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make builds draw no report, which would take most of the time of a small build."""
-    monkeypatch.setattr("stereocell.report.phase.run_report", lambda out: None)
+    monkeypatch.setattr("stereocell.report.phase.run_report", lambda *_, **__: None)
 
 
 @pytest.fixture

@@ -122,7 +122,7 @@ def build(
         phases.run_units(folder, engine)
         phases.run_stage(folder, engine)
         phases.run_bundle(folder, engine)
-        report_phase.run_report(folder)
+        report_phase.run_report(folder, engine)
     parts = ("stage/stage.usda", "bundle/index.html", "report/index.html")
     return Built(shown, *(f"{shown}/{part}" for part in parts))
 

@@ -89,7 +89,7 @@ def learn(voxels: NDArray[Any], _: object, *, options: TissueOptions) -> SimpleN
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Skip the report, which takes longest and is written last."""
-    monkeypatch.setattr(report, "run_report", lambda out: None)
+    monkeypatch.setattr(report, "run_report", lambda *_, **__: None)
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def undisturbed(built: Path) -> Path:
     """A copy of `built` to which two classes were added without a fault."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "run_report", lambda out: None)
+        patch.setattr(report, "run_report", lambda *_, **__: None)
         out = copy(built, built.parent / "undisturbed")
         assert tissue(out) == 0
     return out
@@ -184,7 +184,7 @@ def run_until(out: str, flags: list[str], event: str, place: str) -> None:
                 os.kill(os.getpid(), signal.SIGKILL)
 
     console.quiet = True
-    phases.viewer_dist, report.run_report = (lambda: None), (lambda out: None)
+    phases.viewer_dist, report.run_report = (lambda: None), (lambda *_, **__: None)
     learn_tissue_step.learn_tissue = learn  # type: ignore[assignment]
     sys.addaudithook(hook)
     tissue(Path(out), *flags)
@@ -351,7 +351,7 @@ def test_a_damaged_file_is_reported_and_made_again(
         line = only_line(capfd)
         assert str(out / name) in line
         assert f"run `stereocell tissue {out}` again" in line
-    monkeypatch.setattr(report, "run_report", lambda out: None)
+    monkeypatch.setattr(report, "run_report", lambda *_, **__: None)
     assert tissue(out) == 0
     printed = capfd.readouterr().err
     assert Path(name).name in printed

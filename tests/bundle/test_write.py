@@ -286,18 +286,18 @@ def test_viewer_may_not_replace_files_of_the_bundle(stage, tmp_path):
 
 
 @pytest.mark.parametrize("escape", ["id", "path"])
-def test_finished_tile_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path, escape):
+def test_finished_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path, escape):
     parts = tmp_path / "parts"
     write_bundle(stage, tmp_path / "first", None, engine=Engine(0), parts=parts)
     (tmp_path / "secret.txt").write_text("private")
-    for record in sorted(parts.glob("*/tile.json")):
+    for record in sorted(parts.glob("*/*/tile.json")):
         content = load(record)
         if escape == "id":
             content["id"] = f"../parts/{content['id']}"
         else:
             for channel in content["channels"]:
                 for file in channel["files"]:
-                    file |= {"path": "../../secret.txt", "bytes": 7}
+                    file |= {"path": "../../../secret.txt", "bytes": 7}
         record.write_text(json.dumps(content))
     write_bundle(stage, tmp_path / "again", None, engine=Engine(0), parts=parts)
     assert files(tmp_path / "again") == files(bundle)
@@ -314,7 +314,7 @@ def test_resumed_bundle_names_edited_layers_of_finished_tiles(tmp_path):
     layer.documentation = "a long note " * 200
     layer.Save()
     lines = []
-    for name in ("first", "again"):  # the second bundle uses the finished tiles of the first
+    for name in ("first", "again"):  # the second bundle uses the finished parts of the first
         lines.append([])
         write_bundle(
             stage,

@@ -28,6 +28,7 @@ import stereocell
 from stereocell import samples
 from stereocell.building.out_folder import OutFolder
 from stereocell.cli import __main__ as cli
+from stereocell.engine.run import Engine
 from stereocell.model.errors import UsageError
 from stereocell.read import formats
 from stereocell.read.known_formats import known_formats
@@ -128,12 +129,14 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_commands_run(
     sources: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    report: Callable[[Path], None] = drawing.run_report
+    report: Callable[[Path, Engine], None] = drawing.run_report
     drawn: list[Path] = []
 
-    def draw(out: Path) -> None:  # seconds each time: the first that is built, and where asked for
+    def draw(
+        out: Path, engine: Engine, **_: bool
+    ) -> None:  # seconds each time: the first that is built, and where asked for
         if not drawn or command.startswith("stereocell report "):
-            report(out)
+            report(out, engine)
             drawn.append(out)
         else:  # an earlier report is not one of this build
             folder = OutFolder(out)

@@ -72,7 +72,7 @@ def test_an_array_is_built_and_has_a_picture(built_page, tmp_path, monkeypatch, 
 def test_a_build_in_a_temporary_folder_is_removed_when_python_ends(built_page, tmp_path):
     code = BALLS + (
         "from stereocell.bundle import blob_page\n"
-        "from stereocell.report import phase; phase.run_report = lambda out: None\n"
+        "from stereocell.report import phase; phase.run_report = lambda *_, **__: None\n"
         f"from pathlib import Path; blob_page.viewer_dist = lambda: Path({str(built_page)!r})\n"
         "import tempfile; viewer = stereocell.show(ball, spacing_um=(.5, .25, .25))\n"
         "print(viewer._files.answer('manifest.json')[0])\n"

@@ -14,12 +14,13 @@ from markupsafe import escape
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.surface_cover import SurfaceCover
 from stereocell.cli.__main__ import main
+from stereocell.engine.run import Engine
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.errors import OutputError
 from stereocell.model.tiling import Box, Tile
 from stereocell.model.unit import Cover
 from stereocell.planning.channels import Channel
-from stereocell.report import charts, page, write_report
+from stereocell.report import charts, page, pictures, write_report
 from stereocell.report.facts import LodFacts, StepFacts, UnitFacts, gather, sum_up
 from stereocell.report.opening import find_opening
 from stereocell.report.remarks import find_covers, find_remarks
@@ -118,8 +119,8 @@ class _Page(HTMLParser):
         self.texts.append(" ".join(data.split()))
 
 
-def _write(out: Path) -> tuple[str, _Page]:
-    write_report(out)
+def _write(out: Path, *, texture_similarity: bool = False) -> tuple[str, _Page]:
+    write_report(out, Engine(0), texture_similarity=texture_similarity)
     html = OutFolder(out).report_file.read_text("utf-8")
     return html, _Page(html)
 
@@ -189,11 +190,45 @@ def test_page_gives_the_reason_where_a_channel_has_no_2d_function(
     ]
 
 
+@pytest.fixture(scope="module")
+def compared(built: Path) -> tuple[str, _Page]:
+    """The page of the same build with the similarity of levels."""
+    return _write(built, texture_similarity=True)
+
+
+def _without_seal(html: str) -> tuple[str, str]:
+    """Return a page without its last line, a hash of the others, and this line."""
+    text, seal = html.rstrip("\n").rsplit("\n", 1)
+    return text + "\n", seal
+
+
+def test_levels_are_compared_only_if_asked_for(
+    written: tuple[str, _Page], compared: tuple[str, _Page]
+) -> None:
+    (text, _), (without, _) = (_without_seal(html) for html in (compared[0], written[0]))
+    assert "front, 512 px" in compared[1].texts
+    end = "</tbody></table></div>\n"
+    start = text.index('<p class="note">Similarity: ')
+    assert text[:start] + text[text.index(end, start) + len(end) :] == without
+    assert "SSIM" not in without
+
+
+@pytest.mark.slow
+def test_flag_of_the_command_adds_the_comparison_and_its_absence_removes_it(
+    built: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(built, out := tmp_path / "out")
+    for flags in ([], ["--texture-similarity"], []):
+        assert main(["report", *flags, str(out), "--workers", "0"]) == 0
+        html = OutFolder(out).report_file.read_text("utf-8")
+        assert ("Similarity: " in html) == bool(flags)
+
+
 def test_notes_on_distances_name_attributes_of_the_stage(
-    written: tuple[str, _Page],
+    compared: tuple[str, _Page],
 ) -> None:
     """Each note names both distances, since the page shows one and viewers use the other."""
-    text, _ = written
+    text, _ = compared
     notes = re.findall(r'<p class="note">(.*?)</p>', text, re.DOTALL)
     for start in ("Distance: ", "Similarity: "):
         [note] = [note for note in notes if note.startswith(start)]
@@ -219,7 +254,7 @@ def test_same_results_give_the_same_page(built: Path) -> None:
 def test_page_of_many_units_shows_some_and_says_how_many(
     built: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(page, "MAX_PICTURED", 4)
+    monkeypatch.setattr(pictures, "MAX_PICTURED", 4)
     monkeypatch.setattr(page, "MAX_ROWS", 5)
     html, parsed = _write(built)
     shown = sum(alt.startswith("Slices") for alt in parsed.alts)
@@ -230,7 +265,7 @@ def test_page_of_many_units_shows_some_and_says_how_many(
 
 def test_report_before_units_names_the_command(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="run `stereocell plan"):
-        write_report(tmp_path)
+        write_report(tmp_path, Engine(0))
     assert not (tmp_path / "report").exists()
 
 

@@ -18,6 +18,7 @@ from stereocell.preview.draw_slices import (
     cross_section,
     cut_unit,
     draw_slices,
+    find_planes,
     voxels_of,
 )
 from stereocell.report import select_units
@@ -83,15 +84,9 @@ def _slices() -> list[Slice]:
     lattice, first, spacing = Box((2, 10, 20), (14, 50, 80)), (1.0, 2.0, 4.0), (0.5, 0.2, 0.2)
     center = np.array(first) + np.array([6, 8, 48]) * spacing
     volume = np.zeros(lattice.shape, np.uint8)
-    return cut_unit(
-        volume,
-        lattice,
-        first_um=first,
-        spacing_um=spacing,
-        mesh=_ball(center, 1.0),
-        sigma_um=0.2,
-        iso_at=None,
-    )
+    planes = find_planes(volume, lattice, spacing_um=spacing, sigma_um=0.2)
+    ball = _ball(center, 1.0)
+    return cut_unit(planes, first_um=first, spacing_um=spacing, mesh=ball, iso_at=None)
 
 
 def test_mid_slices_meet_the_mesh_where_it_lies() -> None:
@@ -116,8 +111,9 @@ def test_picture_shows_the_outline_unmirrored_and_in_proportion() -> None:
 def test_field_minus_iso_value_is_zero_on_a_ramps_own_level() -> None:
     lattice = Box((0, 0, 0), (9, 16, 16))
     ramp = np.broadcast_to(np.arange(16, dtype=np.uint8) * 10, lattice.shape)
+    planes = find_planes(ramp, lattice, spacing_um=(1, 1, 1), sigma_um=0.7)
     slices = cut_unit(
-        ramp, lattice, first_um=(0, 0, 0), spacing_um=(1, 1, 1), mesh=None, sigma_um=0.7,
+        planes, first_um=(0, 0, 0), spacing_um=(1, 1, 1), mesh=None,
         iso_at=lambda box: np.full(box.shape, 70, np.float32),
     )  # fmt: skip
     by_name = {s.view.name: s.above for s in slices}

@@ -24,7 +24,7 @@ def test_a_full_disk_is_one_line_leaves_no_partial_file_and_the_build_goes_on_la
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if not IS_EXHAUSTIVE:  # drawing the report takes longest and needs little of the disk
-        monkeypatch.setattr("stereocell.report.phase.run_report", lambda out: None)
+        monkeypatch.setattr("stereocell.report.phase.run_report", lambda *_, **__: None)
     body = np.stack([phantoms.f_phantom()] * 2)
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", body, "CZYX", names=["a", "b"])
 

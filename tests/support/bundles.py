@@ -54,16 +54,15 @@ def files(folder):
 def write_bundle(stage, folder, viewer, *, engine, parts=None, report_line=lambda _: None):
     """Write the bundle of a stage outside of a build, in the order of building/phases.py.
 
-    parts  folder in which finished tiles are kept and found again; None: a temporary folder
+    parts  folder in which finished parts are kept and found again; None: a temporary folder
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     kept = nullcontext(parts) if parts else tempfile.TemporaryDirectory(dir=folder.parent)
     with kept as place, steps.opened_stage(stage) as composed:
         for note in composed.notes(stage):
             report_line(note)
-        tiles = steps.bundle_tile_tasks(composed, Path(place))
-        run_missing(engine, "bundle", tiles)
-        for note in steps.write_bundle(composed, [tile.place for tile in tiles], folder, viewer):
+        run_missing(engine, "bundle", steps.bundle_part_tasks(composed, Path(place)))
+        for note in steps.write_bundle(composed, Path(place), folder, viewer):
             report_line(note)
 
 

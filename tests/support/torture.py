@@ -278,8 +278,9 @@ class Torture:
         self.place.clear()
 
     def _require_written_once(self, now: dict[str, object]) -> None:
-        def look(name: str) -> object:  # a whole bundle has no parts left
-            gone = self._finished[name] if name.startswith("bundle_parts/") else None
+        def look(name: str) -> object:  # a whole stage or bundle has no parts left
+            is_part = name.startswith(("stage_parts/", "bundle_parts/"))
+            gone = self._finished[name] if is_part else None
             return now.get(name, gone)
 
         again = [name for name, at in self._finished.items() if look(name) != at]
@@ -293,7 +294,7 @@ class Torture:
             folder, _, last = name.rpartition("/")
             if last == "stage.json":  # written after the tile's folder
                 folder = f"stage/tiles/{folder.rpartition('/')[2]}"
-            if last in ("unit.json", "stage.json", "tile.json"):
+            if last in ("unit.json", "stage.json", "part.json", "tile.json"):
                 files = (file for file in now if file.startswith(f"{folder}/"))
                 self._finished = {file: now[file] for file in files} | self._finished
 

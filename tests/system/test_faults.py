@@ -157,7 +157,7 @@ BOUND = ("setpriv", "--bounding-set=-dac_override") if os.geteuid() == 0 else ()
 
 
 def in_the_middle_of(phase: str, out: Path, fault: str) -> list[str]:
-    """Return a command that runs a phase, in which the fault happens once the first tile is done.
+    """Return a command that runs a phase, in which the fault happens once the first task is done.
 
     fault  "killed", or "read-only": OUT can't be written
 
@@ -195,28 +195,26 @@ def test_an_out_that_becomes_read_only_within_a_phase_is_named_and_the_phase_goe
 
 
 @pytest.mark.slow
-def test_finished_tiles_of_stage_and_bundle_are_not_made_again(
+def test_finished_parts_of_stage_and_bundle_are_not_made_again(
     volume: Path, undisturbed: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
     assert main(["plan", str(volume), "-o", str(out), "--grid", GRID]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    for phase, made in (("stage", "stage/tiles"), ("bundle", "bundle_parts/*")):
+    for phase, record in (("stage", "part.json"), ("bundle", "tile.json")):
         ended = subprocess.run(in_the_middle_of(phase, out, "killed"), check=False)
         assert ended.returncode == -signal.SIGKILL
-        (tile,) = out.glob(f"{made}/r0_c[01]")
-        finished = {file.relative_to(tile): file.stat().st_mtime_ns for file in tile.rglob("*.*")}
-        assert len(finished) >= 3  # a tile of the stage has a layer and two volumes
+        (part,) = (file.parent for file in out.glob(f"{phase}_parts/**/{record}"))
+        files = [file for file in part.rglob("*.*") if file.name != record]
+        finished = {(file.name, file.stat().st_mtime_ns) for file in files}
+        assert len(finished) >= 2  # a part of the stage has two files of voxels
         capsys.readouterr()
         assert main([phase, str(out), "--workers", "0"]) == 0
         (printed,) = [one for one in capsys.readouterr().err.splitlines() if f"{phase}: 1/" in one]
         assert printed.startswith(f"{phase}: 1/1 r0_c")
-        assert tile.name not in printed
-        final = tile if phase == "stage" else out / "bundle"
-        for name, written in finished.items():
-            if name.name != "tile.json":  # not part of the finished bundle
-                assert (final / name).stat().st_mtime_ns == written
-    assert not (out / "bundle_parts").exists()
+        whole = {(file.name, file.stat().st_mtime_ns) for file in (out / phase).rglob("*.*")}
+        assert finished <= whole
+    assert not [*out.glob("*_parts")]
     assert assets(asset_digests(out)) == undisturbed
 
 
@@ -230,9 +228,9 @@ def test_a_finished_tile_that_is_damaged_or_of_other_settings_is_made_again(
     grid.write_bytes(b"cut")
     capsys.readouterr()
     assert main(["stage", str(out), "--workers", "0"]) == 0
-    assert "stage: 1/1 r0_c1" in capsys.readouterr().err
+    assert "stage: 1/1 r0_c1/" in capsys.readouterr().err
     subprocess.run(in_the_middle_of("bundle", out, "killed"), check=False)
-    (part,) = out.glob("bundle_parts/*/r0_c[01]")
+    (part,) = (file.parent for file in out.glob("bundle_parts/**/tile.json"))
     next(part.rglob("*.glb")).write_bytes(b"cut")
     capsys.readouterr()
     assert main(["bundle", str(out), "--workers", "0"]) == 0

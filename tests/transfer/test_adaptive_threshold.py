@@ -18,7 +18,8 @@ from stereocell.cli.__main__ import main
 from stereocell.isosurface.level_evidence import Counting
 from stereocell.isosurface.level_histogram import Scale
 from stereocell.model.channel import SurfaceLevel
-from stereocell.report.thresholds import describe, draw_cut, draw_threshold, find_peers
+from stereocell.report.thresholds import describe, draw_threshold, find_peers
+from stereocell.report.unit_pictures import draw_cut
 from stereocell.steps.find_window import Window, window_from_json, window_to_json
 from stereocell.transfer.adaptive_threshold import (
     Histogram,

@@ -75,7 +75,8 @@ class OutFolder:
         self.stage_file = self.stage_dir / "stage.usda"
         self.stage_list = self.stage_dir / "files.json"
         self.bundle_dir = out / "bundle"
-        self.parts_dir = out / "bundle_parts"  # the bundle's finished tiles, until it is complete
+        self.stage_parts_dir = out / "stage_parts"  # finished parts of tiles of the stage
+        self.parts_dir = out / "bundle_parts"  # finished parts of the bundle, until it is complete
         self.report_file = out / "report" / "index.html"
 
     def require_name(self) -> None:

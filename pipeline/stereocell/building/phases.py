@@ -48,10 +48,10 @@ from stereocell.planning.settings import Settings, to_readable_toml
 from stereocell.planning.settle import settle
 from stereocell.planning.stage_steps import stage_step, stage_tile_step
 from stereocell.planning.survey import Survey
-from stereocell.planning.unit_steps import choose_units, unit_steps
+from stereocell.planning.unit_steps import choose_units, longest_first, unit_steps
 from stereocell.read.image import printable
 from stereocell.read.source_place import require_apart
-from stereocell.steps.write_bundle import bundle_tile_tasks, opened_stage, write_bundle
+from stereocell.steps.write_bundle import bundle_part_tasks, opened_stage, write_bundle
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.overwriting import is_forced
@@ -127,7 +127,8 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
             for name, step in steps.items()
         }
         missing = {name: unit for name, unit in units.items() if not unit.is_whole()}
-        to_build = [unit for name, unit in missing.items() if name in wanted]
+        asked = (name for name in missing if name in wanted)
+        to_build = [missing[name] for name in longest_first(plan, survey, asked)]
         if to_build:
             for labels in plan.labels:
                 phase.print(*notes_on_objects(labels, located[labels.id]))
@@ -188,7 +189,10 @@ def run_stage(out: Path, engine: Engine) -> None:
             located = Passes(out_folder, plan, engine).objects(labels)
             tables[labels.id], remarks = table_of_objects(out_folder, plan, labels, located)
             phase.print(*remarks)
-        steps = [stage_tile_step(plan, tile, units, tables, stage_dir) for tile in plan.tiles]
+        parts_dir = out_folder.stage_parts_dir
+        steps = [
+            stage_tile_step(plan, tile, units, tables, stage_dir, parts_dir) for tile in plan.tiles
+        ]
         tiles = {
             tile.id: Kept(tile.id, step, out_folder.tile_file(tile.id), step.inputs)
             for tile, step in zip(plan.tiles, steps, strict=True)
@@ -198,7 +202,10 @@ def run_stage(out: Path, engine: Engine) -> None:
             return
         out_folder.remove(stage_dir / USDZ_NAME)
         out_folder.remove(out_folder.stage_list)  # lists the files of the earlier stage
-        run_missing(engine, "stage", tiles.values())
+        to_write = [step for step in steps if not tiles[step.content.id].is_whole()]
+        out_folder.remove_other_folders(parts_dir, {step.key for step in to_write})
+        run_missing(engine, "stage", [part for step in to_write for part in step.part_tasks()])
+        run_missing(engine, "tiles", [tiles[step.content.id] for step in to_write])
         phase.print(stage.write(stage_dir))
         out_folder.remove_other_folders(stage_dir / "tiles", {*tiles})
         made = {id_: tile.read() for id_, tile in tiles.items()}
@@ -213,8 +220,9 @@ def run_stage(out: Path, engine: Engine) -> None:
                 f"{measured / 1e6:.1f} of {whole / 1e6:.1f} MB are voxels as measured, which other "
                 "windows need; --bits 8 leaves them out"
             )
-        stage.write_list(stage_dir, files)
+        stage.write_list(stage_dir, files, engine)
         phase.print(describe_parts(read_stage_list(stage_dir)))
+        out_folder.remove(parts_dir)
 
 
 def run_bundle(
@@ -244,10 +252,8 @@ def run_bundle(
             parts = out_folder.parts_dir / step.key
             with opened_stage(path) as composed:
                 phase.print(*composed.notes(out_folder.stage_file))
-                tiles = bundle_tile_tasks(composed, parts)
-                run_missing(engine, "bundle", tiles)
-                written = [tile.place for tile in tiles]
-                for note in write_bundle(composed, written, out_folder.bundle_dir, viewer):
+                run_missing(engine, "bundle", bundle_part_tasks(composed, parts))
+                for note in write_bundle(composed, parts, out_folder.bundle_dir, viewer):
                     phase.print(note)
             phase.about = "" if stage is None else f"of {printable(path.name)}"
         elif stage is not None:  # lost edits are reported again, although nothing is written

@@ -1,11 +1,12 @@
-"""Write and read a tile's part of a bundle: its record, and references to its files.
+"""Write and read parts of a bundle, each of one channel of a tile: record and files.
 
-The part is a folder. It holds the tile's files under their paths in the bundle, and the record
+A part is a folder. It holds files of the bundle under their paths in the bundle, and the record
 tile.json with the data that the bundle's common files need.
 """
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -114,8 +115,21 @@ def _records() -> TypeAdapter[BundleTile]:
     return TypeAdapter(BundleTile)
 
 
-def read_part(part: Path) -> BundleTile:
-    """Return the tile whose part is in a folder. Raises OutputError if files are missing."""
+def part_of(parts: Path, tile_id: str, channel_id: str) -> Path:
+    """Return the folder of the part for one channel of a tile."""
+    return parts / tile_id / channel_id
+
+
+def read_tile(parts: Path, tile_id: str, channel_ids: Iterable[str]) -> BundleTile:
+    """Return a tile from the parts of its channels. Raises OutputError if files are missing."""
+    own = [read_part(part_of(parts, tile_id, channel), tile_id) for channel in channel_ids]
+    channels = tuple(channel for one in own for channel in one.channels)
+    changed = tuple(sorted({name for one in own for name in one.changed}))
+    return replace(own[0], channels=channels, changed=changed)
+
+
+def read_part(part: Path, tile_id: str) -> BundleTile:
+    """Return the tile, with the channels of a part. Raises OutputError if files are missing."""
     remedy = "run `stereocell bundle OUT` again"
     try:
         tile = _records().validate_python(read_json(part / _RECORD, None, remedy))
@@ -124,11 +138,11 @@ def read_part(part: Path) -> BundleTile:
     sizes = sizes_of(part)
     refs = [ref for channel in tile.channels for ref in channel.files]
     # Files are moved by the paths in the record, so each path must be one of a file in this folder.
-    if tile.id != part.name or any(sizes.get(ref.path) != ref.bytes for ref in refs):
+    if tile.id != tile_id or any(sizes.get(ref.path) != ref.bytes for ref in refs):
         raise OutputError(f"{part}: damaged: {remedy}")
     return tile
 
 
 def write_record(root: Path, tile: BundleTile) -> None:
-    """Write tile.json into the folder of a tile's part. Raises OutputError."""
+    """Write tile.json into the folder of a part. Raises OutputError."""
     write_json(root / _RECORD, _records().dump_python(tile, mode="json"))

@@ -10,11 +10,11 @@
     specimen.usdz                                  a small copy for AR viewers: see write_ar
     index.html  assets/                            the viewer
 
-The stage is the only source. Each tile is exported separately as a part, and the parts are kept
-until the bundle is complete.
+The stage is the only source. Each channel of a tile is exported separately as a part, and the parts
+are kept until the bundle is complete.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from stereocell.bundle.copy_viewer import copy_viewer
 from stereocell.bundle.describe import describe_bundle, write_channel
 from stereocell.bundle.gather_table import gather_table
 from stereocell.bundle.manifest import FILES, MANIFEST
-from stereocell.bundle.tile_part import FileRef, read_part, write_file
+from stereocell.bundle.tile_part import FileRef, part_of, read_tile, write_file
 from stereocell.bundle.write_additions import write_additions
 from stereocell.bundle.write_ar import write_ar
 from stereocell.bundle.write_lights import write_lights
@@ -128,30 +128,31 @@ class Composed:
 
 
 def fill_bundle(
-    composed: Composed, parts: Sequence[Path], root: Path, viewer_dist: Path | None
+    composed: Composed, parts: Path, root: Path, viewer_dist: Path | None
 ) -> Iterator[str]:
     """Write a bundle into an empty folder, and yield messages for the user.
 
-    parts        folders of the finished tiles, whose files are moved into the bundle
+    parts        folder of the finished parts, whose files are moved into the bundle
     viewer_dist  folder of the built viewer; None: the bundle gets no page
 
     The messages name layers that changed since the build and surfaces that were edited by hand, and
     give the reason if there is no specimen.usdz.
     """
     stage = composed.stage
-    tiles = [read_part(part) for part in parts]
+    names = [appearance.id for appearance in composed.appearances]
+    tiles = [read_tile(parts, tile_id, names) for tile_id in composed.tile_ids]
     changed = {path_from_stage(file, composed.path) for file in composed.as_written.changed}
     for name in sorted(changed.union(*(tile.changed for tile in tiles))):
         yield (
             f"{composed.path.absolute().parent / name}: {CHANGED}, and is used as it is: if nobody "
             f"edited it, remove it and {REMEDY}"
         )
-    files = []
-    for part, tile in zip(parts, tiles, strict=True):
-        refs = [ref for channel in tile.channels for ref in channel.files]
-        for ref in refs:
+    files: list[FileRef] = []
+    for tile, channel in [(one, channel) for one in tiles for channel in one.channels]:
+        part = part_of(parts, tile.id, channel.channel_id)
+        for ref in channel.files:
             move(part / ref.path, root / ref.path)
-        files += refs
+        files += channel.files
     channels = []
     for i, appearance in enumerate(composed.appearances):
         own = [(t.id, t.channels[i]) for t in tiles]

@@ -1,6 +1,6 @@
-"""Write the part of a bundle for one tile: its meshes and volumes, and its record.
+"""Write the part of a bundle for one channel of a tile: its meshes, its volume, and its record.
 
-Tiles do not depend on each other. See tile_part.py for the folder of a part.
+Parts do not depend on each other. See tile_part.py for the folder of a part.
 """
 
 from collections.abc import Sequence
@@ -49,15 +49,19 @@ FIRST_COLUMN = "volume_um3"  # ID of the first column in every table of objects
 
 def write_tile(
     stage_path: Path,
+    tile_id: str,
     part: Path,
     *,
     appearances: tuple[ComposedAppearance, ...],
     step_m: float,
+    only: str | None = None,
 ) -> None:
-    """Write the part of a bundle for one tile.
+    """Write the part of a bundle for one channel of a tile, or for all of them.
 
-    part    folder of the part, whose name is the tile's ID
-    step_m  step of the lattice for vertices, metres, see formats/gltf.py
+    part         folder of the part
+    appearances  appearances of all channels
+    step_m       step of the lattice for vertices, metres, see formats/gltf.py
+    only         ID of the channel; None: all channels
 
     Opens the stage and loads only this tile. So it can run in any process, and tiles do not stay in
     memory. Raises StageError and OutputError.
@@ -67,7 +71,7 @@ def write_tile(
     with (
         usd_boundary(stage_path),
         replacing_folder(part) as root,
-        loaded(stage, part.name, as_written=as_written) as (tile, choice),
+        loaded(stage, tile_id, as_written=as_written) as (tile, choice),
     ):
         volumes = [read_volume(tile, appearance.id) for appearance in appearances]
         channels = [
@@ -81,11 +85,12 @@ def write_tile(
                 as_written=as_written,
             )
             for appearance, volume in zip(appearances, volumes, strict=True)
+            if only in (None, appearance.id)
         ]
         low, high = find_bounds(tile, volumes)
         changed = tuple(sorted(path_from_stage(file, stage_path) for file in as_written.changed))
         made = BundleTile(
-            part.name,
+            tile_id,
             choice.representation,
             low,
             high,

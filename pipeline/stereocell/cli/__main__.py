@@ -272,7 +272,7 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
     "report": (
         "write a page with pictures, sizes and times",
         "report out/mine",
-        flags.declare_out,
+        flags.declare_report,
         commands.one_phase("report"),
     ),
     "tissue": (

@@ -222,7 +222,8 @@ def _run_phases(
             )  # imported here, since drawing needs large libraries
 
             engine.watch("report", 0, 1, "")
-            phase.run_report(out)
+            texture_similarity = getattr(options, "texture_similarity", False)
+            phase.run_report(out, engine, texture_similarity=texture_similarity)
     seconds = {name: phase["seconds"] for name, phase in OutFolder(out).phases().items()}
     results = {
         "stage": "stage/stage.usda",

@@ -346,6 +346,18 @@ def declare_bundle(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def declare_report(parser: argparse.ArgumentParser) -> None:
+    """Declare the flags of `report`."""
+    declare_out(parser)
+    declare_workers(parser)
+    parser.add_argument(
+        "--texture-similarity",
+        action="store_true",
+        help="also compare pictures of a coarser level of detail with the finest, by SSIM, in up "
+        "to three pairs of tile and channel; each takes 2 to 10 s",
+    )
+
+
 def declare_check(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `check`."""
     declare_out(parser)

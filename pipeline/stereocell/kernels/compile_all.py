@@ -159,9 +159,11 @@ def compile_others() -> None:
     xxh32(bytes(7))
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
     find_downhill(voxels, points.astype(np.float64), np.ones(3))
-    pixel = np.zeros((1, 2), np.int64)
     near, which = np.full((1, 1), -np.inf), np.zeros((1, 1), np.int64)
-    find_visible(np.ones((1, 10)), np.ones((1, 3)), pixel, pixel, near, which, np.ones((1, 1, 3)))
+    mesh_of = np.zeros((1, 1), np.int32)
+    corners, heights = np.ascontiguousarray(at[:, :2]), np.ones(4)
+    drawn = triangles.astype(np.uint32)
+    find_visible(corners, heights, drawn, 0, near, mesh_of, which, np.ones((1, 1, 3)))
     one = np.ones(1, np.float32)
     cast_rays(voxels > 0, points, points, points, points, one, one)
 

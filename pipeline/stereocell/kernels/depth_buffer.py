@@ -1,5 +1,7 @@
 """Find the triangle nearest to the eye at each pixel of an image."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,29 +10,53 @@ from stereocell.kernels.compiled import kernel
 
 @kernel
 def find_visible(
-    frames: NDArray[np.float64],
+    places: NDArray[np.float64],
     depth: NDArray[np.float64],
-    low: NDArray[np.int64],
-    high: NDArray[np.int64],
+    triangles: NDArray[np.uint32],
+    number: int,
     nearest: NDArray[np.float64],
+    mesh_of: NDArray[np.int32],
     triangle_of: NDArray[np.int64],
     weights_of: NDArray[np.float64],
 ) -> None:
-    """Write the nearest triangle of each pixel, its barycentric weights and its depth.
+    """Write where a mesh is nearer to the eye than all before it: at which triangle, and how deep.
 
-    frames       (m, 10), for each triangle: corner a (x, y) in pixels; edges a to b and a to c;
-                 twice the area; the heights over the edges opposite a, b and c
-    depth        (m, 3), depth at each corner; larger is nearer
-    low, high    (m, 2), first and last pixel (x, y) near each triangle
-    nearest      (height, width), depth; minus infinity where no triangle is visible
+    places       (n, 2), vertices in pixels: x right, y down
+    depth        (n,), larger is nearer
+    triangles    (m, 3)
+    number       number of the mesh
+    nearest      (height, width), depth; minus infinity where nothing is visible
+    mesh_of      (height, width), number of the visible mesh
     triangle_of  (height, width)
-    weights_of   (height, width, 3)
+    weights_of   (height, width, 3), barycentric coordinates
     """
-    for triangle in range(len(frames)):
-        ax, ay, abx, aby, acx, acy, twice, over_a, over_b, over_c = frames[triangle]
-        for row in range(low[triangle, 1], high[triangle, 1] + 1):
+    last_row, last_column = nearest.shape[0] - 1, nearest.shape[1] - 1
+    for triangle in range(len(triangles)):
+        i, j, k = triangles[triangle]
+        (ax, ay), (bx, by), (cx, cy) = places[i], places[j], places[k]
+        # Most triangles of a fine surface lie between the centres of pixels.
+        left = max(math.ceil(min(ax, bx, cx) - 0.5 - 1e-6), 0)
+        right = min(math.floor(max(ax, bx, cx) - 0.5 + 1e-6), last_column)
+        if left > right:
+            continue
+        top = max(math.ceil(min(ay, by, cy) - 0.5 - 1e-6), 0)
+        bottom = min(math.floor(max(ay, by, cy) - 0.5 + 1e-6), last_row)
+        if top > bottom:
+            continue
+        abx, aby, acx, acy, bcx, bcy = bx - ax, by - ay, cx - ax, cy - ay, cx - bx, cy - by
+        twice = abx * acy - aby * acx  # the area
+        ab, ac, bc = (
+            math.sqrt(abx * abx + aby * aby),
+            math.sqrt(acx * acx + acy * acy),
+            math.sqrt(bcx * bcx + bcy * bcy),
+        )
+        # Slivers count as flat, because their weights are noise.
+        if abs(twice) <= 1e-6 * max(ab, ac, bc) ** 2 + 1e-12:
+            continue
+        over_a, over_b, over_c = abs(twice) / bc, abs(twice) / ac, abs(twice) / ab
+        for row in range(top, bottom + 1):
             y = row + 0.5 - ay
-            for column in range(low[triangle, 0], high[triangle, 0] + 1):
+            for column in range(left, right + 1):
                 x = column + 0.5 - ax
                 b = (x * acy - y * acx) / twice
                 c = (abx * y - aby * x) / twice
@@ -38,9 +64,10 @@ def find_visible(
                 # A pixel counts as inside up to 1e-9 pixels beyond an edge.
                 if -a * over_a > 1e-9 or -b * over_b > 1e-9 or -c * over_c > 1e-9:
                     continue
-                here = depth[triangle, 0] * a + depth[triangle, 1] * b + depth[triangle, 2] * c
+                here = depth[i] * a + depth[j] * b + depth[k] * c
                 if here > nearest[row, column]:
                     nearest[row, column] = here
+                    mesh_of[row, column] = number
                     triangle_of[row, column] = triangle
                     weights_of[row, column, 0] = a
                     weights_of[row, column, 1] = b

@@ -45,8 +45,10 @@ SHARES = {
     "components": 0.08,
     "units": 0.3,
     "stage": 0.2,
-    "bundle": 0.08,
-    "report": 0.13,
+    "tiles": 0.01,
+    "previews": 0.05,
+    "bundle": 0.09,
+    "report": 0.06,
 }
 _PREDICTABLE = 0.15  # share of a build from which its pace predicts the end; its start is slow
 _NICE = 10  # niceness, 0 to 19; a larger one means lower priority

@@ -162,8 +162,9 @@ class PartialView:
         # The volumes are most of the work. They are not written, since the coarse ones stay.
         replace(step, shared=frozenset(unit.channel_id for unit in step.units)).run()
         part = self._scratch / "parts" / tile.id
-        write_tile(self._stage, part, appearances=survey.appearances, step_m=survey.step_m)
-        built = read_part(part)
+        looks, step_m = survey.appearances, survey.step_m
+        write_tile(self._stage, tile.id, part, appearances=looks, step_m=step_m)
+        built = read_part(part, tile.id)
         shutil.rmtree(self._stage.parent / "tiles" / tile.id)
         coarse = survey.coarse[tile.id]
         merged = map(_merge, built.channels, coarse.channels)

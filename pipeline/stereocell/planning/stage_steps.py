@@ -22,11 +22,13 @@ def stage_tile_step(
     units: Mapping[str, Path],
     tables: Mapping[str, ObjectTable],
     stage_dir: Path,
+    parts_dir: Path | None = None,
 ) -> WriteStageTile:
     """Return the step that writes one tile.
 
-    units   folder of each unit, by `<tile>/<channel>`
-    tables  tables of all objects, by the ID of their label map
+    units      folder of each unit, by `<tile>/<channel>`
+    tables     tables of all objects, by the ID of their label map
+    parts_dir  see `WriteStageTile`
     """
     parts = [
         UnitPart(
@@ -61,6 +63,7 @@ def stage_tile_step(
         own,
         not plan.settings.volume.without_vdb,
         stage_dir=stage_dir,
+        parts_dir=parts_dir,
     )
 
 

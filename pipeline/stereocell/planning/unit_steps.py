@@ -1,5 +1,7 @@
 """Make the steps that build the units of a plan's channels."""
 
+import math
+from collections.abc import Iterable
 from itertools import product
 
 from stereocell.meshes.alpha_wrap import find_wrapper
@@ -25,6 +27,23 @@ def unit_steps(plan: Plan, survey: Survey) -> dict[str, BuildUnit]:
         f"{tile.id}/{channel.id}": _unit_step(plan, tile, channel, survey)
         for tile, channel in product(plan.tiles, plan.channels)
     }
+
+
+def longest_first(plan: Plan, survey: Survey, names: Iterable[str]) -> list[str]:
+    """Return units tile by tile, and those of a tile by their expected work, the most first.
+
+    names  `<tile>/<channel>` of each
+
+    So the workers of a small build end at about the same time. The work of a surface grows with its
+    voxel faces. Objects of label maps come first, because their work is not known.
+    """
+    tiles = {tile.id: place for place, tile in enumerate(plan.tiles)}
+
+    def rank(name: str) -> tuple[int, float]:
+        tile, channel = name.split("/")
+        return tiles[tile], -survey[channel].most_faces if channel in survey else -math.inf
+
+    return sorted(names, key=rank)
 
 
 def _unit_step(plan: Plan, tile: Tile, channel: Channel, survey: Survey) -> BuildUnit:

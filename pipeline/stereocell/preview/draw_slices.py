@@ -56,49 +56,110 @@ class Slice:
     contours: tuple[tuple[Color, NDArray[np.float32]], ...] = ()
 
 
-def cut_unit(
+@dataclass(frozen=True, slots=True)
+class MiddlePlane:
+    """The middle plane of a unit across one axis, in the order of its view's axes.
+
+    index       number of the plane along the axis
+    box         the plane's box in voxels of the dataset
+    grey        uint8 (rows, columns)
+    spacing_um  (row, column), um
+    field       float32 (rows, columns), the smoothed voxels, which contours follow
+    """
+
+    view: View
+    index: int
+    box: Box
+    grey: NDArray[np.uint8]
+    spacing_um: tuple[float, float]
+    field: NDArray[np.float32]
+
+    def above(self, iso_at: Callable[[Box], NDArray[np.float32]]) -> NDArray[np.float32]:
+        """Return the field minus an iso-value, in the orientation of the picture.
+
+        iso_at  returns the iso-value, on the scale of 8 bits, at the voxels of a box of the dataset
+        """
+        return self.view.plane(self.field - iso_at(self.box).transpose(self.view.order)[0])
+
+
+def find_planes(
     volume: NDArray[np.uint8],
     lattice: Box,
+    *,
+    spacing_um: Spacing,
+    sigma_um: float,
+    views: Sequence[View] = MICROSCOPE,
+) -> list[MiddlePlane]:
+    """Return the three middle planes of a unit.
+
+    volume      uint8 (z, y, x), the lattice's voxels, without an apron
+    lattice     the lattice's box in voxels of the dataset
+    spacing_um  (z, y, x), um
+    sigma_um    sigma of the Gaussian before surface extraction
+    views       the three views to draw
+    """
+    planes = []
+    for view in views:
+        order = view.order
+        k = lattice.shape[order[0]] // 2
+        turned = volume.transpose(order)
+        z, y, x = (spacing_um[i] for i in order)
+        reach = math.ceil(SMOOTHING_REACH * sigma_um / z)
+        field = smooth(Volume(turned[max(0, k - reach) : k + reach + 1], (z, y, x)), sigma_um)
+        box = _plane(lattice, order[0], k)
+        planes.append(MiddlePlane(view, k, box, turned[k], (y, x), field[min(k, reach)]))
+    return planes
+
+
+def cut_unit(
+    planes: Sequence[MiddlePlane],
     *,
     first_um: Point,
     spacing_um: Spacing,
     mesh: Mesh | None,
-    sigma_um: float,
     iso_at: Callable[[Box], NDArray[np.float32]] | None,
-    views: Sequence[View] = MICROSCOPE,
 ) -> list[Slice]:
-    """Return the three middle slices of a unit.
+    """Return the three middle slices of a unit with its surface.
 
-    volume      uint8 (z, y, x), the lattice's voxels, without an apron
-    lattice     the lattice's box in voxels of the dataset
     first_um    (z, y, x), um, centre of the first voxel
     spacing_um  (z, y, x), um
     mesh        finest mesh, in world um; None if there is no surface
-    sigma_um    sigma of the Gaussian before surface extraction
-    iso_at      returns the iso-value, on the scale of 8 bits, at the voxels of a box of the dataset
-    views       the three views to draw
+    iso_at      see `MiddlePlane.above`; None: no contour
     """
     points = None if mesh is None else voxels_of(mesh, first_um, spacing_um)
     slices = []
-    for view in views:
-        order = axis, down, right = view.order
-        k = lattice.shape[axis] // 2
-        turned = volume.transpose(order)
-        spacing = tuple(spacing_um[i] for i in order)
-        above = None
-        if iso_at is not None:
-            reach = math.ceil(SMOOTHING_REACH * sigma_um / spacing[0])
-            slab = turned[max(0, k - reach) : k + reach + 1]
-            field = smooth(Volume(slab, (spacing[0], spacing[1], spacing[2])), sigma_um)
-            plane = iso_at(_plane(lattice, axis, k)).transpose(order)[0]
-            above = view.plane(field[min(k, reach)] - plane)
+    for plane in planes:
+        axis, down, right = plane.view.order
         outline = np.zeros((0, 2, 2))
         if points is not None and mesh is not None:
-            cut = cross_section(points, mesh.triangles, axis, float(k))[:, :, [down, right]]
-            outline = view.points(cut, (lattice.shape[down], lattice.shape[right]))
-        grey = view.plane(turned[k])
-        slices.append(Slice(view, grey, (spacing[1], spacing[2]), outline, above))
+            cut = cross_section(points, mesh.triangles, axis, float(plane.index))
+            rows, columns = plane.grey.shape
+            outline = plane.view.points(cut[:, :, [down, right]], (rows, columns))
+        above = None if iso_at is None else plane.above(iso_at)
+        grey = plane.view.plane(plane.grey)
+        slices.append(Slice(plane.view, grey, plane.spacing_um, outline, above))
     return slices
+
+
+def cut_contour(
+    planes: Sequence[MiddlePlane], iso_at: Callable[[Box], NDArray[np.float32]]
+) -> list[Slice]:
+    """Return the three middle slices of a unit with the contour of an iso-value.
+
+    The contour is the only line, so it is drawn solid, in the colour of surfaces.
+    """
+    nothing = np.zeros((0, 2, 2))
+    return [
+        Slice(
+            plane.view,
+            plane.view.plane(plane.grey),
+            plane.spacing_um,
+            nothing,
+            None,
+            ((OUTLINE, plane.above(iso_at)),),
+        )
+        for plane in planes
+    ]
 
 
 def voxels_of(mesh: Mesh, first_um: Point, spacing_um: Spacing) -> NDArray[np.float64]:

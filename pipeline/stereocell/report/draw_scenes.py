@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -31,6 +32,11 @@ class Scene:
     boxes: tuple[Box, ...]
     frame: Box
     size: tuple[int, int]
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The files of the surfaces."""
+        return tuple(Path(surface.file) for surface in self.surfaces)
 
 
 @dataclass(frozen=True, slots=True)

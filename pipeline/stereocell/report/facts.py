@@ -85,6 +85,11 @@ class UnitFacts:
     lifted: Lifted | None = None
 
     @property
+    def key(self) -> tuple[str, str]:
+        """The IDs of tile and channel."""
+        return self.tile.id, self.channel.id
+
+    @property
     def name(self) -> str:
         """The tile's ID and the channel's name, `<tile>/<channel>`."""
         return f"{self.tile.id}/{self.channel.name}"

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from stereocell.building.made_of import FIELD
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.phase import phase_of
+from stereocell.engine.run import Engine
 from stereocell.engine.step import Keyed
 from stereocell.planning.provenance import provenance_record
 from stereocell.report.page import TEMPLATE, write_report
@@ -15,21 +16,28 @@ from stereocell.report.page import TEMPLATE, write_report
 
 @dataclass(frozen=True, slots=True)
 class WriteReport(Keyed):
-    """Write the report. The fields are all documents of OUT that it shows, and its template."""
+    """Write the report.
 
-    VERSION: ClassVar[int] = 3
+    The fields are all documents of OUT that it shows, its template, and whether it compares levels
+    of detail.
+    """
+
+    VERSION: ClassVar[int] = 4
 
     index: Mapping[str, str]
     survey: Mapping[str, Any]
     provenance: Mapping[str, Any]
     phases: Mapping[str, Any]
     template: str
+    texture_similarity: bool
 
 
-def run_report(out: Path) -> None:
+def run_report(out: Path, engine: Engine, *, texture_similarity: bool = False) -> None:
     """Write OUT/report/index.html, where its content has changed.
 
-    Raises OutputError where units are missing or damaged.
+    texture_similarity  whether pictures of coarser levels are compared with the finest level
+
+    Raises OutputError where units are missing, TasksFailedError where units are damaged.
     """
     out_folder = OutFolder(out)
     with phase_of(out_folder, "report") as phase:
@@ -46,6 +54,7 @@ def run_report(out: Path) -> None:
             provenance_record(plan),
             others,
             TEMPLATE.read_text("utf-8"),
+            texture_similarity,
         )
         if not phase.is_done(step):
-            write_report(out)
+            write_report(out, engine, texture_similarity=texture_similarity)

@@ -9,7 +9,7 @@ from stereocell.report.select_units import thin_out
 from stereocell.report.texture_similarity import find_close_likeness, find_likeness
 from stereocell.steps.unit_files import load_lods, load_record
 
-MAX_COMPARED = 3  # largest number of units that are drawn and compared; each takes 4 to 10 s
+MAX_COMPARED = 3  # largest number of units that are drawn and compared; each takes 2 to 10 s
 COMPARED = 2  # level of detail that is compared with lod0; the coarsest where there are fewer
 
 

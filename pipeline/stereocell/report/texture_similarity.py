@@ -25,7 +25,7 @@ from scipy import ndimage
 from skimage.metrics import structural_similarity
 
 from stereocell.model.mesh import Lod
-from stereocell.textures.rasterize import find_pixels
+from stereocell.textures.rasterize import Seen
 
 # Directions (x, y, z) to the viewer: front, right, left, above, below. z points out of the front.
 VIEWS = ((0.0, 0.0, 1.0), (0.9, 0.3, 0.5), (-0.9, 0.3, 0.5), (0.1, 0.9, 0.4), (0.1, -0.9, 0.4))
@@ -74,9 +74,9 @@ def draw(
     from_middle = mesh.positions.astype(np.float64) - ends.mean(axis=0)
     places = np.stack([from_middle @ right, -(from_middle @ up)], axis=1) * scale + edge / 2
     depth = from_middle @ to_eye
-    pixel, triangle, weights = find_pixels(
-        places[mesh.triangles], depth[mesh.triangles], (edge, edge)
-    )
+    seen = Seen.nothing((edge, edge))
+    seen.add(0, places, depth, mesh.triangles)
+    pixel, triangle, weights = seen.of(0)
     normals, openness = _shading(lod, triangle, weights)
     normals *= np.where(normals @ to_eye < 0, -1.0, 1.0)[:, None]  # both sides are drawn
     light = to_eye + 0.5 * right + 0.5 * up

@@ -8,19 +8,13 @@ Li & Tam, "An iterative algorithm for minimum cross entropy thresholding", Patte
 Letters 19(8), 1998, https://doi.org/10.1016/S0167-8655(98)00057-9
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 from skimage import filters
 
-from stereocell.model.spacing import Spacing
-from stereocell.preview.draw_slices import Slice, draw_slices
-from stereocell.preview.views import MICROSCOPE, View
 from stereocell.report import charts
-from stereocell.report.draw_scenes import Picture
 from stereocell.transfer.adaptive_threshold import Histogram, Threshold
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
@@ -110,29 +104,6 @@ def find_peers(histogram: Histogram) -> tuple[float, float]:
     fewer = np.ceil(counts * min(1.0, _LI_VOXELS / counts.sum())).astype(np.int64)
     li = filters.threshold_li(np.repeat(levels, fewer))
     return float(otsu), float(li)
-
-
-def draw_cut(
-    volume: NDArray[np.uint8],
-    spacing_um: Spacing,
-    threshold: float,
-    *,
-    views: Sequence[View] = MICROSCOPE,
-) -> Picture:
-    """Return a picture of a volume's middle slices, with voxels below the threshold in black.
-
-    volume     uint8 (z, y, x), windowed
-    threshold  0..1 in the window
-    views      directions of the slices
-    """
-    slices = []
-    for view in views:
-        order = view.order
-        plane = view.plane(volume.transpose(order)[volume.shape[order[0]] // 2])
-        grey = np.where(plane >= 255 * threshold, plane, 0).astype(np.uint8)
-        spacing = (spacing_um[order[1]], spacing_um[order[2]])
-        slices.append(Slice(view, grey, spacing, np.zeros((0, 2, 2)), None))
-    return Picture(*draw_slices(slices))
 
 
 def _share_above(statistics: ChannelStatistics, value: float) -> float:

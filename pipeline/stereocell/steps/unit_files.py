@@ -150,6 +150,16 @@ def lod_file(directory: Path, level: int) -> Path:
     return directory / f"lod{level}.npz"
 
 
+def record_file(directory: Path) -> Path:
+    """Return the path of unit.json."""
+    return directory / _RECORD
+
+
+def volume_file(directory: Path) -> Path:
+    """Return the path of the voxels."""
+    return directory / _VOXELS
+
+
 def find_closed(directory: Path) -> Path | None:
     """Return the file of the unit's closed copy; None: there is none. Raises OutputError."""
     has_one = load_record(directory)["closed"] is not None
@@ -159,8 +169,14 @@ def find_closed(directory: Path) -> Path | None:
 def load_lods(directory: Path) -> tuple[Lod, ...]:
     """Return the levels of detail, finest first. Raises OutputError for a damaged file."""
     lods = load_record(directory)["lods"]
+    return tuple(load_lod(directory, level) for level in range(len(lods)))
+
+
+def load_lod(directory: Path, level: int) -> Lod:
+    """Return one level of detail; 0 is the finest. Raises OutputError for a damaged file."""
+    lods = load_record(directory)["lods"]
     try:
-        return tuple(_load_lod(directory, level, lod) for level, lod in enumerate(lods))
+        return _load_lod(directory, level, lods[level])
     except (OSError, ValueError, LookupError, EOFError, BadZipFile) as error:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
 

@@ -1,13 +1,13 @@
-"""The steps that write the bundle from the composed stage: first its tiles, then the rest."""
+"""The steps that write the bundle from the composed stage: first its parts, then the rest."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 from stereocell.bundle.manifest import require_bundle
-from stereocell.bundle.tile_part import read_part
+from stereocell.bundle.tile_part import part_of, read_part
 from stereocell.bundle.write import Composed, fill_bundle
 from stereocell.bundle.write_tile import write_tile
 from stereocell.engine.run_steps import Task
@@ -36,8 +36,8 @@ class WriteBundle(Keyed):
 
 
 @dataclass(frozen=True, slots=True)
-class WriteBundleTile(Work):
-    """Write one tile's part of a bundle. Workers do this for `WriteBundle`.
+class WriteBundlePart(Work):
+    """Write the part of a bundle for one channel of a tile. Workers do this for `WriteBundle`.
 
     A part has no key of its own. It lies in a folder named by the bundle's key, which is removed
     when the bundle is complete.
@@ -48,20 +48,29 @@ class WriteBundleTile(Work):
     """
 
     stage: Path
+    tile_id: str
+    channel_id: str
     appearances: tuple[ComposedAppearance, ...]
     step_m: float
 
     def is_whole(self, place: Path) -> bool:
         """Return whether all files of the part lie at a place."""
         try:
-            read_part(place)
+            part = read_part(place, self.tile_id)
         except OutputError:
             return False
-        return True
+        return [channel.channel_id for channel in part.channels] == [self.channel_id]
 
     def keep(self, place: Path) -> None:
         """Write the part. Raises StageError and OutputError."""
-        write_tile(self.stage, place, appearances=self.appearances, step_m=self.step_m)
+        write_tile(
+            self.stage,
+            self.tile_id,
+            place,
+            appearances=self.appearances,
+            step_m=self.step_m,
+            only=self.channel_id,
+        )
 
 
 @contextmanager
@@ -75,18 +84,26 @@ def opened_stage(stage: Path) -> Iterator[Composed]:
         yield Composed.open(stage)
 
 
-def bundle_tile_tasks(composed: Composed, parts: Path) -> list[Task]:
-    """Return a task for each tile, which writes the tile's part into a folder in `parts`."""
-    step = WriteBundleTile(composed.path, composed.appearances, composed.step_m)
-    return [Task(tile_id, step, parts / tile_id) for tile_id in composed.tile_ids]
+def bundle_part_tasks(composed: Composed, parts: Path) -> list[Task]:
+    """Return a task for each channel of each tile, which writes their part into `parts`."""
+    looks, step_m = composed.appearances, composed.step_m
+    return [
+        Task(
+            f"{tile_id}/{look.id}",
+            WriteBundlePart(composed.path, tile_id, look.id, looks, step_m),
+            part_of(parts, tile_id, look.id),
+        )
+        for tile_id in composed.tile_ids
+        for look in looks
+    ]
 
 
 def write_bundle(
-    composed: Composed, parts: Sequence[Path], bundle_dir: Path, viewer_dist: Path | None
+    composed: Composed, parts: Path, bundle_dir: Path, viewer_dist: Path | None
 ) -> Iterator[str]:
-    """Write the bundle over its finished tiles, in place of an older one, and yield notes.
+    """Write the bundle over its finished parts, in place of an older one, and yield notes.
 
-    parts        folders of the tiles' parts; see `fill_bundle`
+    parts        folder of the parts; see `fill_bundle`
     viewer_dist  folder of the built viewer, which is copied into the bundle; None: no viewer
 
     Raises OutputError if `bundle_dir` can't be written, or holds something other than a bundle.

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
+from stereocell.engine.run import Engine
 from stereocell.engine.step import Keyed
 from stereocell.model.channel import Appearance
 from stereocell.model.object_table import ObjectTable
@@ -77,15 +79,16 @@ class WriteStage(Keyed):
             tables=self.tables.of_labels,
         )
 
-    def write_list(self, stage_dir: Path, tiles: FileList) -> None:
+    def write_list(self, stage_dir: Path, tiles: FileList, engine: Engine) -> None:
         """Write specimen.usdz and the previews, and at last the list of all files.
 
-        tiles  list of the tiles' files
+        tiles   list of the tiles' files
+        engine  workers that draw the previews
         """
         stage, small = stage_dir / STAGE_NAME, stage_dir / USDZ_NAME
         as_written = AsWritten({stage_dir.resolve(): tiles})
         write_usdz(stage, small, as_written=as_written)
-        write_previews(stage_dir, as_written)
+        write_previews(stage_dir, as_written, partial(engine.run, "previews"))
         others = (
             stage_dir / name
             for name in ("looks", PREVIEWS, CONTENTS_NAME, DISPLAY_NAME, NVINDEX_NAME)

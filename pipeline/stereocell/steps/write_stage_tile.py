@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-from stereocell.engine.step import Document, Step, content_of
+from stereocell.engine.run_steps import Task
+from stereocell.engine.step import Document, Step, Work, content_of
 from stereocell.model.channel import PaintColors
 from stereocell.model.object_table import ObjectTable, SharedInterfaces
 from stereocell.model.tile_content import ChannelContent, TileContent
@@ -16,9 +17,12 @@ from stereocell.steps.unit_files import (
     load_lods,
     load_voxels,
 )
-from stereocell.storage.file_list import FileList
-from stereocell.usd import write_stage as stage_writer
+from stereocell.storage.atomic_write import replacing_folder
+from stereocell.storage.file_list import FileList, find_faults
 from stereocell.usd import written_files
+from stereocell.usd.write_tile import Written, write_channel, write_tile
+
+_RECORD = "part.json"  # record of a part
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,19 @@ class UnitPart:
     def key_content(self) -> list[object]:
         """Return the content for a key. The unit counts by its folder's name, which is its key."""
         return [self.channel_id, self.folder.name, self.color, content_of(self.paint)]
+
+    def content(self, *, has_volume: bool) -> ChannelContent:
+        """Return what the unit's folder holds. Raises OutputError if a file is damaged."""
+        volume, measured = load_voxels(self.folder) if has_volume else (None, None)
+        return ChannelContent(
+            self.channel_id,
+            load_lods(self.folder),
+            volume,
+            self.paint,
+            find_closed(self.folder),
+            measured,
+            color=self.color,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +95,7 @@ class WriteStageTile(Step[StageTile]):
     has_vdb    whether the volumes are written for other programs, too
     shared     IDs of channels that only have a surface, because their volume is another channel's
     stage_dir  folder of the stage, where an artist may edit the tile's files
+    parts_dir  folder in which `parts` wrote the files of its channels; None: `run` writes them
     """
 
     VERSION: ClassVar[int] = 3
@@ -91,11 +109,33 @@ class WriteStageTile(Step[StageTile]):
     tables: tuple[TableOfTile, ...] = ()
     has_vdb: bool = True
     stage_dir: Path = field(kw_only=True, compare=False)
+    parts_dir: Path | None = field(default=None, kw_only=True, compare=False)
 
     @property
     def inputs(self) -> tuple[Path, ...]:
         """The folders of the tile's units."""
         return tuple(unit.folder for unit in self.units)
+
+    def part_tasks(self) -> list[Task]:
+        """Return a task for each channel, which writes the channel's files as a part."""
+        return [
+            Task(
+                f"{self.content.id}/{unit.channel_id}",
+                WriteStagePart(self, unit),
+                self._part_of(unit),
+                (unit.folder,),
+            )
+            for unit in self.units
+        ]
+
+    def _part_of(self, unit: UnitPart) -> Path:
+        assert self.parts_dir is not None
+        return self.parts_dir / self.key / unit.channel_id
+
+    def has_volume(self, unit: UnitPart) -> bool:
+        """Return whether the tile has the volume of a unit."""
+        is_labels = any(table.labels_id == unit.channel_id for table in self.tables)
+        return not is_labels and unit.channel_id not in self.shared
 
     def is_whole(self, place: Path) -> bool:
         """Return whether the tile and its units are undamaged, and its inputs have not changed."""
@@ -107,28 +147,56 @@ class WriteStageTile(Step[StageTile]):
         return are_whole and written_files.is_kept(folder, found.files, since=place)
 
     def run(self) -> StageTile:
-        """Write the tile. Raises OutputError if a unit is damaged."""
+        """Write the tile. Raises OutputError if a unit or a part is damaged."""
         tables = {one.labels_id: one for one in self.tables}
-        channels = tuple(self._content_of(unit, tables.get(unit.channel_id)) for unit in self.units)
-        content = replace(self.content, channels=channels)
-        return StageTile(
-            self.key, *stage_writer.write_tile(self.stage_dir, content, has_vdb=self.has_vdb)
-        )
+        channels = []
+        for unit in self.units:
+            one, table = (
+                unit.content(has_volume=self.has_volume(unit)),
+                tables.get(unit.channel_id),
+            )
+            if table is not None:
+                one = replace(one, objects=table.table, touching=table.touching)
+            channels.append(one)
+        parts = None
+        if self.parts_dir is not None:
+            places = [self._part_of(unit) for unit in self.units]
+            parts = {place: _written(self.FORM.read(place / _RECORD)) for place in places}
+        content = replace(self.content, channels=tuple(channels))
+        written = write_tile(self.stage_dir, content, has_vdb=self.has_vdb, parts=parts)
+        return StageTile(self.key, written.files, written.measured_bytes)
 
-    def _content_of(self, unit: UnitPart, table: TableOfTile | None) -> ChannelContent:
-        has_volume = table is None and unit.channel_id not in self.shared
-        volume, measured = load_voxels(unit.folder) if has_volume else (None, None)
-        return ChannelContent(
-            unit.channel_id,
-            load_lods(unit.folder),
-            volume,
-            unit.paint,
-            find_closed(unit.folder),
-            measured,
-            table.table if table else None,
-            table.touching if table else None,
-            unit.color,
-        )
+
+@dataclass(frozen=True, slots=True)
+class WriteStagePart(Work):
+    """Write the files of one channel of a tile. Workers do this for `WriteStageTile`.
+
+    A part has no key of its own. It lies in a folder named by the tile's key, which is removed when
+    the stage is complete. Its record has the form of the tile's.
+    """
+
+    tile: WriteStageTile
+    unit: UnitPart
+
+    def is_whole(self, place: Path) -> bool:
+        """Return whether all files of the part lie at a place."""
+        found = WriteStageTile.FORM.find(place / _RECORD)
+        if found is None or found.key != self.tile.key:
+            return False
+        return not find_faults(place, found.files, since=place / _RECORD)
+
+    def keep(self, place: Path) -> None:
+        """Write the part. Raises OutputError."""
+        tile = self.tile
+        channel = self.unit.content(has_volume=tile.has_volume(self.unit))
+        with replacing_folder(place) as folder:
+            written = write_channel(folder, tile.content, channel, has_vdb=tile.has_vdb)
+            record = StageTile(tile.key, written.files, written.measured_bytes)
+            WriteStageTile.FORM.write(folder / _RECORD, record)
+
+
+def _written(part: StageTile) -> Written:
+    return Written(part.files, part.measured_bytes)
 
 
 def _digest(interfaces: SharedInterfaces) -> str:

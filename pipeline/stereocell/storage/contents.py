@@ -29,7 +29,8 @@ _PARTS = {
     "bundle": "the bundle of a build",
     "report": "the report of a build",
     "tissue": "the tissue classes of a build",
-    "bundle_parts": "unfinished tiles of a build's bundle",
+    "stage_parts": "finished parts of a build's unfinished stage",
+    "bundle_parts": "finished parts of a build's unfinished bundle",
     "bricks": "bricks cached by `stereocell serve`",
 }
 # Words for files of surfaces, by their endings; most of these formats have no mark of their own

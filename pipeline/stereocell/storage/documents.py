@@ -32,7 +32,7 @@ SCHEMAS: dict[str, str | None] = {
     r"done\.json": "units.schema.json#Index",
     r"unit\.json": "units.schema.json#Unit",
     r"seconds\.json": "units.schema.json#Seconds",
-    r"stage\.json": "units.schema.json#StageTile",
+    r"(stage|part)\.json": "units.schema.json#StageTile",
     r"window-.*\.json": "units.schema.json#Window",
     r"evidence-.*\.json": "units.schema.json#Evidence",
     r"components-.*\.json": "units.schema.json#Components",

@@ -25,6 +25,7 @@ _LAST = (
     "manifest.json",
     "unit.json",
     "tile.json",
+    "part.json",
 )
 # Keys of the objects that steer a build; there are a few for each unit, and all are small.
 STEERING = re.compile(

@@ -16,7 +16,7 @@ For a local OUT these functions do nothing. Few modules call them:
 - `steps/unit_files.py`, for a file of a unit
 - `steps/open_source.py`, for an added channel
 - `steps/tissue_files.py`, for all classes
-- `bundle/write.py`, which moves the files of finished tiles
+- `bundle/write.py`, which moves the files of finished parts
 """
 
 import os

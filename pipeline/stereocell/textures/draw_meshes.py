@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.color import to_srgb8
-from stereocell.textures.rasterize import find_pixels
+from stereocell.textures.rasterize import Seen
 
 Vector = NDArray[np.float64]
 Box = tuple[tuple[float, ...], tuple[float, ...]]
@@ -107,22 +107,23 @@ def _shade(shapes: Iterable[Shape], view: _View) -> tuple[Vector, Vector]:
     """Return the linear light (h * w, 3) of the nearest surfaces, and their depths (h, w)."""
     picture = np.empty((view.size[0] * view.size[1], 3))
     picture[:] = _BACKGROUND
-    nearest = np.full(view.size, -np.inf)
-    for shape in shapes:
+    seen = Seen.nothing(view.size)
+    drawn = []
+    for number, shape in enumerate(shapes):
         places, depth = view.place(shape.positions)
-        corners = places[shape.triangles]
-        pixel, triangle, weights = find_pixels(
-            corners, depth[shape.triangles], view.size, nearest=nearest
-        )
+        seen.add(number, places, depth, shape.triangles)
+        drawn.append((shape, places))
+    for number, (shape, places) in enumerate(drawn):  # pixels of hidden surfaces are not shaded
+        pixel, triangle, weights = seen.of(number)
         at = shape.triangles[triangle]
         shaded = np.einsum("nk,nkj->nj", weights, shape.normals[at].astype(np.float64))
         shaded = shaded @ view.axes
-        shaded[_are_turned_away(corners[triangle])] *= -1  # the inside is drawn, too
+        shaded[_are_turned_away(places[at])] *= -1  # the inside is drawn, too
         color = shape.color
         if color.ndim == 2:
             color = np.einsum("nk,nkj->nj", weights, color[at])
         picture[pixel] = _light(shaded, color)
-    return picture, nearest
+    return picture, seen.nearest
 
 
 def _shrink(drawn: Vector) -> Vector:

@@ -1,6 +1,7 @@
 """Rasterize triangles: texels of a map, pixels of a view."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,36 +46,61 @@ def find_texels(
     return found, triangle_of[found], weights_of[found], nearest[found]
 
 
-def find_pixels(
-    corners: NDArray[np.float64],
-    depth: NDArray[np.float64],
-    size: tuple[int, int],
-    *,
-    nearest: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return the triangle that is visible at each pixel of an image, and the point on it.
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """The nearest surface at each pixel of an image, over several meshes.
 
-    corners  float64 (m, 3, 2), pixels, x right, y down
-    depth    float64 (m, 3), larger is nearer
-    size     (height, width), pixels
-    nearest  float64 (height, width), depth of what is drawn already; updated in place
-    result   pixel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
-             float64 (k, 3)
+    nearest   float64 (height, width), depth; larger is nearer; minus infinity: nothing is visible
+    mesh      int32 (height, width), number of the mesh; -1: nothing is visible
+    triangle  int64 (height, width), index of the triangle of that mesh
+    weights   float64 (height, width, 3), barycentric coordinates
+
+    `triangle` and `weights` are undefined where nothing is visible.
     """
-    height, width = size
-    if nearest is None:
-        nearest = np.full(size, -np.inf)
-    triangle_of = np.full(size, -1)
-    weights_of = np.zeros((height, width, 3))
-    low, high = _boxes(corners, size, 0.0)
-    # Most triangles of a fine surface lie between the centres of pixels.
-    drawn = np.flatnonzero((low[:, 0] <= high[:, 0]) & (low[:, 1] <= high[:, 1]))
-    frames, is_flat = _frames(corners[drawn])
-    drawn = drawn[~is_flat]
-    kept = np.ascontiguousarray(frames.T[~is_flat])
-    find_visible(kept, depth[drawn], low[drawn], high[drawn], nearest, triangle_of, weights_of)
-    found = np.flatnonzero(triangle_of >= 0)
-    return found, drawn[triangle_of.ravel()[found]], weights_of.reshape(-1, 3)[found]
+
+    nearest: NDArray[np.float64]
+    mesh: NDArray[np.int32]
+    triangle: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+    @classmethod
+    def nothing(cls, size: tuple[int, int]) -> "Seen":
+        """Return an image (height, width) without a surface."""
+        nearest, mesh = np.full(size, -np.inf), np.full(size, -1, np.int32)
+        return cls(nearest, mesh, np.empty(size, np.int64), np.empty((*size, 3)))
+
+    def add(
+        self,
+        number: int,
+        places: NDArray[np.float64],
+        depth: NDArray[np.float64],
+        triangles: NDArray[np.uint32],
+    ) -> None:
+        """Add a mesh, which hides what lies behind it.
+
+        places     float64 (n, 2), vertices in pixels, x right, y down
+        depth      float64 (n,), larger is nearer
+        triangles  uint32 (m, 3)
+        """
+        find_visible(
+            np.ascontiguousarray(places),
+            np.ascontiguousarray(depth),
+            np.ascontiguousarray(triangles, np.uint32),
+            number,
+            self.nearest,
+            self.mesh,
+            self.triangle,
+            self.weights,
+        )
+
+    def of(self, number: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+        """Return the visible points of a mesh.
+
+        result  pixel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
+                float64 (k, 3)
+        """
+        pixel = np.flatnonzero(self.mesh == number)
+        return pixel, self.triangle.ravel()[pixel], self.weights.reshape(-1, 3)[pixel]
 
 
 def _cover(

@@ -8,6 +8,8 @@ All images show the surfaces of `specimen.usdz`. If a scene sets the root's `mod
 bytes on every machine.
 """
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -41,8 +43,48 @@ _SIDES = {
 }
 
 
-def write_previews(stage_dir: Path, as_written: AsWritten) -> bool:
+@dataclass(frozen=True, slots=True)
+class Preview:
+    """A preview to draw.
+
+    shapes  surfaces of the specimen
+    box     box (corners x, y, z, world um) around all tiles, which cards fill
+    side    side of the box that a card shows; empty: the thumbnail
+    """
+
+    shapes: list[Shape]
+    box: Box
+    side: str
+
+
+def draw_preview(wanted: Preview) -> NDArray[np.uint8]:
+    """Return the image of a preview, uint8 (h, w, 3) or (h, w, 4)."""
+    shapes = wanted.shapes
+    if not wanted.side:
+        low = np.min([shape.positions.min(axis=0) for shape in shapes], axis=0)
+        high = np.max([shape.positions.max(axis=0) for shape in shapes], axis=0)
+        frame = tuple(low.tolist()), tuple(high.tolist())
+        return draw_pixels(shapes, frame, (_THUMBNAIL_WIDTH, _THUMBNAIL_WIDTH))
+    right, up, to_eye, turns = _SIDES[wanted.side]
+    axes = np.array([right, up, to_eye], np.float64).T
+    upright = draw_side(shapes, wanted.box, axes, _CARD_EDGE)
+    return np.ascontiguousarray(np.rot90(upright, turns))
+
+
+Draw = Callable[[Preview], NDArray[np.uint8]]
+# Returns the results of a function for tasks, each with a name.
+RunAll = Callable[[Draw, Sequence[tuple[str, Preview]]], list[NDArray[np.uint8]]]
+
+
+def run_here(draw: Draw, tasks: Sequence[tuple[str, Preview]]) -> list[NDArray[np.uint8]]:
+    """Draw previews one after another in this process."""
+    return [draw(task) for _, task in tasks]
+
+
+def write_previews(stage_dir: Path, as_written: AsWritten, run_all: RunAll = run_here) -> bool:
     """Draw the previews of a stage, and refer to them in stage.usda.
+
+    run_all  draws them, for example on several processes
 
     Returns whether there are previews: a specimen without surfaces has none. Raises OutputError if
     a file can't be written.
@@ -55,21 +97,14 @@ def write_previews(stage_dir: Path, as_written: AsWritten) -> bool:
     box = tuple(boxes[:, 0].min(axis=0).tolist()), tuple(boxes[:, 1].max(axis=0).tolist())
     with replacing_folder(stage_dir / PREVIEWS) as folder:
         if found:
-            _draw(folder, [_shape_of(part.lod) for part in found], box)
+            shapes = [_shape_of(part.lod) for part in found]
+            names = {_THUMBNAIL: "", **{_card_name(side): side for side in _SIDES}}
+            tasks = [(name, Preview(shapes, box, side)) for name, side in names.items()]
+            for name, pixels in zip(names, run_all(draw_preview, tasks), strict=True):
+                _save(pixels, folder / name)
     if found:
         _name_previews(stage, path)
     return bool(found)
-
-
-def _draw(folder: Path, shapes: list[Shape], box: Box) -> None:
-    low = np.min([shape.positions.min(axis=0) for shape in shapes], axis=0)
-    high = np.max([shape.positions.max(axis=0) for shape in shapes], axis=0)
-    frame = tuple(low.tolist()), tuple(high.tolist())
-    size = (_THUMBNAIL_WIDTH, _THUMBNAIL_WIDTH)
-    _save(draw_pixels(shapes, frame, size), folder / _THUMBNAIL)
-    for side, (right, up, to_eye, turns) in _SIDES.items():
-        upright = draw_side(shapes, box, np.array([right, up, to_eye], np.float64).T, _CARD_EDGE)
-        _save(np.ascontiguousarray(np.rot90(upright, turns)), folder / _card_name(side))
 
 
 def _save(pixels: NDArray[np.uint8], file: Path) -> None:

@@ -17,7 +17,8 @@ two limits the detail of the bundle, but a coarser level does (usd/read_variants
 """
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,7 @@ from stereocell.model.tile_content import APRON, ChannelContent, TileContent
 from stereocell.model.world_box import world_box
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import FileList, measure
+from stereocell.storage.workspace import move
 from stereocell.usd.layer import (
     CHANNELS,
     DISTANCE,
@@ -65,12 +67,30 @@ _STEPS = np.arange(256, dtype=np.uint8)  # possible values of bytes that are bak
 _Types = Sdf.ValueTypeNames
 
 
-def write_tile(stage_dir: Path, tile: TileContent, *, has_vdb: bool = True) -> tuple[FileList, int]:
+@dataclass(frozen=True, slots=True)
+class Written:
+    """Files that were written into a folder.
+
+    files           list of the files, by name
+    measured_bytes  bytes of the voxels as measured in them
+    """
+
+    files: FileList
+    measured_bytes: int
+
+
+def write_tile(
+    stage_dir: Path,
+    tile: TileContent,
+    *,
+    has_vdb: bool = True,
+    parts: Mapping[Path, Written] | None = None,
+) -> Written:
     """Write the folder `stage_dir`/tiles/<tile>/, and replace an older one.
 
     has_vdb  whether volumes get OpenVDB fields, which other programs draw
-
-    Returns the list of its files, and the size in bytes of the voxels as measured.
+    parts    folders of the files of all channels, which `write_channel` wrote, and are moved into
+             the tile's; None: the files are written here
 
     Tiles do not depend on each other. Raises OutputError if a file can't be written, and ValueError
     (a bug) if the shape of a volume does not fit its tile.
@@ -78,13 +98,33 @@ def write_tile(stage_dir: Path, tile: TileContent, *, has_vdb: bool = True) -> t
     for channel in tile.channels:
         _check_shape(tile, channel)
     with replacing_folder(stage_dir / "tiles" / tile.id) as folder:
-        for channel in tile.channels:
-            _write_files(folder, tile, channel, has_vdb)
+        if parts is None:
+            written = [write_channel(folder, tile, one, has_vdb=has_vdb) for one in tile.channels]
+        else:
+            written = list(parts.values())
+            for part, one in parts.items():
+                for name in one.files:
+                    move(part / name, folder / name)
         export(_compose(tile, has_vdb), folder / LAYER_NAME)
-        files = {file.name: measure(file) for file in sorted(folder.iterdir())}
-        # The sizes are read here, since storing the folder may remove large files from this disk.
-        grids = [grid for file in folder.glob("*.vdb") for grid in read_vdb_head(file)]
-        return files, sum(grid.end - grid.start for grid in grids if grid.name == MEASURED_NAME)
+        files = {LAYER_NAME: measure(folder / LAYER_NAME)}
+        files |= {name: dict(entry) for one in written for name, entry in one.files.items()}
+        measured_bytes = sum(one.measured_bytes for one in written)
+        return Written(dict(sorted(files.items())), measured_bytes)
+
+
+def write_channel(
+    folder: Path, tile: TileContent, channel: ChannelContent, *, has_vdb: bool = True
+) -> Written:
+    """Write all files of one channel of a tile, except the layer, into a folder.
+
+    Raises OutputError if a file can't be written, and ValueError (a bug) if the shape of the volume
+    does not fit the tile.
+    """
+    _check_shape(tile, channel)
+    files = list(_write_files(folder, tile, channel, has_vdb))
+    grids = [grid for file in files if file.suffix == ".vdb" for grid in read_vdb_head(file)]
+    measured_bytes = sum(grid.end - grid.start for grid in grids if grid.name == MEASURED_NAME)
+    return Written({file.name: measure(file) for file in files}, measured_bytes)
 
 
 def closed_file(stage_dir: Path, tile_id: str, channel_id: str) -> Path:
@@ -143,24 +183,30 @@ def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
         raise ValueError(f"{tile.id}/{channel.channel_id}: {found}, expected {expected}")
 
 
-def _write_files(folder: Path, tile: TileContent, channel: ChannelContent, has_vdb: bool) -> None:
+def _write_files(
+    folder: Path, tile: TileContent, channel: ChannelContent, has_vdb: bool
+) -> Iterator[Path]:
+    """Write the files of a channel, and yield the path of each."""
     if channel.volume is not None and has_vdb:
         write_vdb(
-            folder / f"{channel.channel_id}.vdb",
+            fields := folder / f"{channel.channel_id}.vdb",
             channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)],
             first_um=tile.first_um,
             spacing_um=tile.spacing_um,
             measured=channel.measured,
             apron=APRON,
         )
+        yield fields
     if channel.volume is not None:
-        write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
+        write_atlas(atlas := folder / f"{channel.channel_id}.exr", channel.volume)
+        yield atlas
     if channel.closed is not None:
-        shutil.copyfile(channel.closed, folder / _closed_name(channel.channel_id))
+        yield shutil.copyfile(channel.closed, folder / _closed_name(channel.channel_id))
     for level, lod in enumerate(channel.lods):
         for kind, image in _images(channel, lod):
-            picture = Image.fromarray(image)
-            picture.save(folder / _map_name(channel, level, kind), format="PNG")
+            file = folder / _map_name(channel, level, kind)
+            Image.fromarray(image).save(file, format="PNG")
+            yield file
 
 
 def _images(channel: ChannelContent, lod: Lod) -> Iterator[tuple[Kind, NDArray[np.uint8]]]:

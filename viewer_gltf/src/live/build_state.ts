@@ -72,6 +72,8 @@ const PARTS: Readonly<Record<string, string>> = {
   objects: "Finding objects",
   units: "Building surfaces",
   stage: "Writing the stage",
+  tiles: "Joining the tiles",
+  previews: "Drawing previews",
   bundle: "Writing the bundle",
   report: "Writing the report",
 };
