@@ -103,7 +103,8 @@ def test_make_lint_asks_for_a_version_where_a_constant_changed(tmp_path: Path) -
     without = shutil.ignore_patterns("__pycache__", "*.tif")
     for name in ("pipeline", "schemas", "usd_assets", "tests/support"):
         shutil.copytree(TOP / name, tmp_path / name, ignore=without)
-    shutil.copy2(TOP / "requirements.lock", tmp_path)
+    for lock in step_record.LOCKS:
+        shutil.copy2(lock, tmp_path)
     package = tmp_path / "pipeline" / PACKAGE.name
     denoise = package / "filters" / "denoise.py"
     constant = "SMOOTHING_REACH = 4.0"
