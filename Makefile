@@ -349,7 +349,7 @@ bench-live: setup-dev ## Time `stereocell view SOURCE`: first picture, its colou
 	$(BIN)/python tests/bench/live_view.py
 	$(BIN)/python tests/bench/live_color.py
 
-bench-start: setup-dev ## Time `import stereocell` and `stereocell --help`
+bench-start: setup-dev ## Time the imports of a command and `stereocell --help`
 	$(BIN)/python tests/bench/start.py
 
 bench-size: setup-dev ## Measure the disk space of each requirement

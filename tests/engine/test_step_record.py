@@ -15,6 +15,7 @@ from packaging.utils import canonicalize_name
 
 from stereocell.engine import step_record as shipped
 from stereocell.engine.step_record import libraries_of
+from stereocell.planning.provenance import STEPS
 from stereocell.read.known_formats import known_formats
 from stereocell.storage.assets import find_asset
 from support import step_record
@@ -260,3 +261,8 @@ def test_all_imported_packages_are_declared_as_dependencies() -> None:
             if top not in {*sys.stdlib_module_names, "stereocell", *BESIDE}:
                 owners = {canonicalize_name(package) for package in installed[top]}
                 assert owners & declared, f"{file.name} imports {top}"
+
+
+def test_steps_that_a_provenance_names_exist(recorded: dict[str, Any]) -> None:
+    assert set(STEPS) <= {step.__name__ for step in step_record.find_steps()}
+    assert set(STEPS) <= recorded["steps"].keys()
