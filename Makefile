@@ -58,8 +58,11 @@ BIN := $(VENV)/bin
 RUN := $(BIN)/stereocell
 WITH_ARGS := $(BIN)/python pipeline/with_args.py
 READY := $(VENV)/.ready
+DEV_READY := $(VENV)/.ready-dev
 KERNELS_READY := $(VENV)/.kernels
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
+# uv takes a fifth of pip's time. pip is the fallback, for example behind an index that only pip is configured for.
+INSTALL = $(BIN)/uv pip install --quiet --python $(BIN)/python $(1) || $(PIP) $(1)
 VIEWER := viewer_gltf
 VIEWER_READY := $(VIEWER)/node_modules/.ready
 VIEWER_DIST := $(VIEWER)/dist/index.html
@@ -76,7 +79,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-build bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
+.PHONY: help setup setup-dev demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-build bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -84,17 +87,22 @@ help: ## Show this help
 
 setup: $(READY) $(KERNELS_READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+; PYTHON=python3.13: .venv-3.13 beside .venv)
 
+setup-dev: setup $(DEV_READY) ## The same with the packages of tests, linters, benchmarks and docs (1.7 GB more)
+
 $(READY): requirements.lock pyproject.toml
 	@"$$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || \
 	  { found=$$("$$PYTHON" --version 2>/dev/null); \
 	    echo "setup: $$PYTHON is $${found:-not installed}, expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
 	test -x $(BIN)/python || "$$PYTHON" -m venv $(VENV)
-	@# uv takes a fifth of pip's time. pip is the fallback, for example behind an index that only pip is configured for.
 	@sed -n '/^uv==/,/[^\\]$$/p' requirements.lock > $(VENV)/uv.lock
 	$(PIP) --require-hashes -r $(VENV)/uv.lock
-	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock || \
-	  $(PIP) --require-hashes -r requirements.lock
-	$(PIP) --no-deps --no-build-isolation -e .
+	$(call INSTALL,--require-hashes -r requirements.lock)
+	$(call INSTALL,--no-deps --no-build-isolation -e .)
+	@touch $@
+
+# Packages of tests, linters, benchmarks and docs. They take as much space as those of users.
+$(DEV_READY): requirements-dev.lock $(READY)
+	$(call INSTALL,--require-hashes -r requirements.lock -r requirements-dev.lock)
 	@touch $@
 
 # Compiles the loops over voxels and triangles (20 s), so that no build has to wait for it.
@@ -130,14 +138,18 @@ mono: browser ## Install Debian's Mono and shader compilers for the tests of the
 	  || echo "mono: can't be installed here, so tests of the Unity package are skipped" >&2; \
 	else echo "mono: no Mono or shader compilers, so tests of the Unity package are skipped; on Debian get them by: sudo make mono"; fi
 
-demo: setup ## Build and check a sample that comes with StereoCell (SAMPLE=cycif, brain-cells, mri or cells)
-	@mkdir -p out/samples
-	test -e $(DEMO_INPUT) || $(RUN) sample "$$SAMPLE" $(DEMO_INPUT)
+# The packages of Python, those of the viewer, the kernels and the sample are made side by side.
+demo: ## Build and check a sample that comes with StereoCell (SAMPLE=cycif, brain-cells, mri or cells)
+	@$(MAKE) --no-print-directory -j3 setup $(DEMO_INPUT)
 	$(WITH_ARGS) $(RUN) build $(DEMO_INPUT) --out="$$OUT" --workers="$$WORKERS" $(DEMO_ARGS) ARGS
 	@echo
 	@du -sh -- "$$OUT"/{stage,bundle,report}
 	$(RUN) check --deep --workers="$$WORKERS" -- "$$OUT"
 	@printf 'look at it:  make view OUT=%q\n' "$$OUT"
+
+$(DEMO_INPUT): | $(READY)
+	@mkdir -p $(@D)
+	$(RUN) sample "$$SAMPLE" $@
 
 # Make accepts no space, `%` or `:` in the name of a file. It therefore finds the files of a phase through
 # a link to OUT. The link lies in a folder named by a checksum of OUT, together with a link to INPUT and a
@@ -187,7 +199,7 @@ view: setup ## Serve the bundle of OUT on this machine and open a browser
 serve: setup ## Serve OUT and stream the voxels that the viewer looks at:  OUT=... [ARGS=--lan]
 	$(WITH_ARGS) $(RUN) serve ARGS -- "$$OUT"
 
-lint: $(READY) $(VIEWER_READY) ## Check style, types, imports between packages, versions of steps and plain English: ruff, mypy, biome, tsc
+lint: $(DEV_READY) $(VIEWER_READY) ## Check style, types, imports between packages, versions of steps and plain English: ruff, mypy, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
 	@# Files opened without an encoding use the system's, which is not UTF-8 on Windows.
 	$(BIN)/ruff check --quiet --preview --select PLW1514 pipeline
@@ -198,7 +210,7 @@ lint: $(READY) $(VIEWER_READY) ## Check style, types, imports between packages, 
 	$(SUPPORT).prose
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
 
-record-steps: $(READY) ## Record the code that each step uses, after you have decided whether its VERSION changes
+record-steps: $(DEV_READY) ## Record the code that each step uses, after you have decided whether its VERSION changes
 	$(SUPPORT).step_record --write
 
 # One process for each core, and one thread in each. More threads would compete for the cores.
@@ -206,7 +218,7 @@ PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"
 SUPPORT := PYTHONPATH=tests $(BIN)/python -m support
 VITEST := cd $(VIEWER) && npm exec --silent -- vitest run
 
-test-here: setup ## Quick tests of one package (T=meshes) or of one folder of the viewer (T=panel)
+test-here: setup-dev ## Quick tests of one package (T=meshes) or of one folder of the viewer (T=panel)
 	@found=; \
 	if [ -n "$$T" ] && [ -e "tests/$$T" ]; then found=1; code=0; $(PYTEST) -m "not slow" "tests/$$T" || code=$$?; \
 	  [ $$code != 5 ] || printf 'all tests of %s are slow: %s tests/%s runs them\n' "$$T" $(BIN)/pytest "$$T"; \
@@ -214,12 +226,12 @@ test-here: setup ## Quick tests of one package (T=meshes) or of one folder of th
 	if [ -n "$$T" ] && [ -e "$(VIEWER)/src/$$T" ]; then found=1; $(VITEST) --project unit "src/$$T" || exit; fi; \
 	[ -n "$$found" ] || { printf 'T is %s, expected a folder of tests or of %s, as T=meshes\n' "$$T" $(VIEWER)/src >&2; exit 2; }
 
-test-fast: setup ## Quick tests: no whole builds, no malformed inputs, no browser
+test-fast: setup-dev ## Quick tests: no whole builds, no malformed inputs, no browser
 	$(PYTEST) -m "not slow" --ignore tests/system --ignore tests/malformed
 	$(VITEST) --project unit
 
 # Tests of Python and of the viewer run side by side. While a browser waits, Python uses the cores.
-test: setup browser mono ## All tests, also those in headless Chromium
+test: setup-dev browser mono ## All tests, also those in headless Chromium
 	$(MAKE) --no-print-directory -j2 test-python test-viewer
 
 # Linux shares the cores between sessions first, and applies `nice` only within a session. Browsers have a
@@ -232,7 +244,7 @@ AGAIN := $(if $(CI),|| $(BIN)/pytest --last-failed --last-failed-no-failures non
 # Three processes share two cores, because tests of builds, servers and clusters often wait. The tests of
 # one file stay in one process, because they share what they have built. In a fresh clone one process
 # compiles all test modules first. Otherwise each of the three would compile them.
-test-python: setup
+test-python: setup-dev
 	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
 	OPENBLAS_NUM_THREADS=1 STEREOCELL_MESSAGES=out/messages.md $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
 
@@ -247,12 +259,12 @@ test-newest: setup ## A few tests with Python 3.13, where it is installed (all: 
 
 # These tests may run at the same time as those of another Python, so they do not write pytest's list of
 # failed tests.
-test-newest-here: setup
+test-newest-here: setup-dev
 	$(BEHIND) $(BIN)/pytest -p no:cacheprovider $(addprefix tests/,$(NEWEST_TESTS))
 NEWEST_TESTS := $(patsubst %,read/test_%.py,tiff bare_zarr zarr_collections number_types n5) \
   storage/test_full_disk.py system/test_empty_environment.py
 
-test-exhaustive: setup browser ## All tests, with all cases of the sweeps of which `make test` runs a few
+test-exhaustive: setup-dev browser ## All tests, with all cases of the sweeps of which `make test` runs a few
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test
 	$(MAKE) --no-print-directory torture
 
@@ -265,11 +277,11 @@ SHOWN := half
 endif
 
 # Tests that need no built bundle run while the bundles of the other tests are built.
-test-viewer: setup browser
+test-viewer: setup-dev browser
 	$(VITEST) --project unit
 	$(MAKE) --no-print-directory -j2 test-pages test-built
 
-test-pages: setup browser
+test-pages: setup-dev browser
 	$(VITEST) --project browser
 
 test-built: test-bundles browser
@@ -281,7 +293,7 @@ test-built: test-bundles browser
 	  STEREOCELL_EDIT_BUNDLES="$$out/edit/before:$$out/edit/built/bundle" \
 	  npm exec --silent -- vitest run --project built
 
-test-bundles: setup
+test-bundles: setup-dev
 ifdef STEREOCELL_EXHAUSTIVE
 	$(MAKE) --no-print-directory demo SAMPLE=cycif OUT=out/$(SHOWN)
 endif
@@ -298,7 +310,7 @@ blender: setup
 	            || $(BLENDER)/bin/pip install --quiet --disable-pip-version-check bpy==5.0.1 'numpy<2'; }; } \
 	  || echo "blender: bpy 5.0.1 can't be installed here (it wants $$BLENDER_BASE and 350 MB)" >&2
 
-test-blender: blender browser ## The Blender add-on in headless Blender (bpy 5.0.1 in .venv/blender)
+test-blender: $(DEV_READY) blender browser ## The Blender add-on in headless Blender (bpy 5.0.1 in .venv/blender)
 	@if $(BLENDER)/bin/python -c 'import bpy' 2>&1; then \
 	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/blender; \
 	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
@@ -306,7 +318,7 @@ test-blender: blender browser ## The Blender add-on in headless Blender (bpy 5.0
 # The last sample is real data. It is left out where the folder of real volumes is missing.
 DCC_SAMPLES := cycif brain-cells mri cells
 DCC_REAL := $(wildcard $(STEREOCELL_DATA)/brain_cells_2ch/brain_cells_2ch.ome.tif)
-test-dcc: blender browser ## Render the samples in Storm, Blender, the add-on, three.js and Cesium; pictures in out/dcc/sheet.png
+test-dcc: $(DEV_READY) blender browser ## Render the samples in Storm, Blender, the add-on, three.js and Cesium; pictures in out/dcc/sheet.png
 	@for sample in $(DCC_SAMPLES); do \
 	  $(MAKE) --no-print-directory demo SAMPLE=$$sample OUT=out/dcc/$$sample || exit; done
 	@[ -z "$(DCC_REAL)" ] || $(RUN) build "$(DCC_REAL)" --out=out/dcc/brain-cells-2ch --workers="$$WORKERS"
@@ -317,51 +329,51 @@ test-dcc: blender browser ## Render the samples in Storm, Blender, the add-on, t
 object-store: setup ## Install versitygw by Go, an object store for the tests (they use moto's server without it)
 	GOBIN="$$PWD/$(BIN)" go install github.com/versity/versitygw/cmd/versitygw@latest
 
-torture: setup ## Kill 50 builds, spread over all phases, and build all malformed inputs and 2640 altered files
+torture: setup-dev ## Kill 50 builds, spread over all phases, and build all malformed inputs and 2640 altered files
 	$(SUPPORT).torture 50
 	$(BIN)/python tests/malformed
 	$(BIN)/python tests/malformed/sweep.py
 
-careless: setup browser ## Use a bundle's page carelessly by script for ten minutes:  [OUT=out/demo] (figures in out/careless.json)
+careless: setup-dev browser ## Use a bundle's page carelessly by script for ten minutes:  [OUT=out/demo] (figures in out/careless.json)
 	out="$$(realpath -- "$$OUT")" && report="$$PWD/out/careless.json" && cd $(VIEWER) && \
 	  STEREOCELL_TEST_BUNDLE="$$out/bundle" STEREOCELL_CARELESS_S=600 STEREOCELL_CARELESS_REPORT="$$report" \
 	  npm exec --silent -- vitest run --project built test/page/careless.built.test.ts -t "changes only"
 
-bench: setup ## Compare pairs of alternatives in one run (ratios of medians)
+bench: setup-dev ## Compare pairs of alternatives in one run (ratios of medians)
 	$(BIN)/python tests/bench/bench.py
 
-bench-build: setup ## Measure each phase of a build of INPUT into OUT, with the check  (WORKERS=1 ARGS="--preset mri")
+bench-build: setup-dev ## Measure each phase of a build of INPUT into OUT, with the check  (WORKERS=1 ARGS="--preset mri")
 	$(WITH_ARGS) $(BIN)/python tests/bench/phases.py "$$OUT" "$$WORKERS" "$$INPUT" ARGS
 
-bench-live: setup ## Time `stereocell view SOURCE`: first picture, its colours, and answers while a build runs
+bench-live: setup-dev ## Time `stereocell view SOURCE`: first picture, its colours, and answers while a build runs
 	$(BIN)/python tests/bench/live_view.py
 	$(BIN)/python tests/bench/live_color.py
 
-bench-start: setup ## Time `import stereocell` and `stereocell --help`
+bench-start: setup-dev ## Time the imports of a command and `stereocell --help`
 	$(BIN)/python tests/bench/start.py
 
-bench-size: setup ## Measure the disk space of each requirement
+bench-size: setup-dev ## Measure the disk space of each requirement
 	$(BIN)/python tests/bench/install_size.py
 
-bench-scale: setup ## Measure units per second, memory and bytes read for 4 to 32 units, and a whole dataset
+bench-scale: setup-dev ## Measure units per second, memory and bytes read for 4 to 32 units, and a whole dataset
 	$(BIN)/python tests/bench/scale.py out/bench-scale
 
-bench-scene: setup ## Time the paper's scene (5 x 2 tiles of 194 x 512 x 512, 3 channels) on 1 and 2 workers and a cluster
+bench-scene: setup-dev ## Time the paper's scene (5 x 2 tiles of 194 x 512 x 512, 3 channels) on 1 and 2 workers and a cluster
 	$(BIN)/python tests/bench/scene.py out/bench-scene
 
-bench-breadth: setup ## Time builds of many small units: up to 22 x 11 tiles of 64^3, 4 channels
+bench-breadth: setup-dev ## Time builds of many small units: up to 22 x 11 tiles of 64^3, 4 channels
 	$(BIN)/python tests/bench/breadth.py out/bench-breadth
 
-bench-iso: setup ## Score the iso-values found on a corpus of volumes, and those of other programs; also on empty volumes
+bench-iso: setup-dev ## Score the iso-values found on a corpus of volumes, and those of other programs; also on empty volumes
 	$(BIN)/python tests/bench/iso.py
 
-bench-level-score: setup ## Compare a scored choice of the iso-value with the sequence of tests, by cross-validation over sources
+bench-level-score: setup-dev ## Compare a scored choice of the iso-value with the sequence of tests, by cross-validation over sources
 	$(BIN)/python tests/bench/level_score.py
 
-bench-threshold: setup ## Compare the adaptive threshold with Otsu's and Li's on the head phantom
+bench-threshold: setup-dev ## Compare the adaptive threshold with Otsu's and Li's on the head phantom
 	$(BIN)/python tests/bench/threshold.py
 
-bench-tissue: setup ## Compare tissue classes with multi-Otsu on the head phantom  (ARGS=--publish: for the docs)
+bench-tissue: setup-dev ## Compare tissue classes with multi-Otsu on the head phantom  (ARGS=--publish: for the docs)
 	$(WITH_ARGS) $(BIN)/python tests/bench/tissue.py ARGS
 
 # The other programs that benchmarks compare with have folders of their own. Benchmarks report which are
@@ -371,24 +383,24 @@ ZMESH = test -d $(PEERS)/python || { mkdir -p $(PEERS) && $(BIN)/uv pip install 
   --python $(BIN)/python --target $(PEERS)/python zmesh==1.15.0; } || rm -rf $(PEERS)/python
 GLTFPACK = test -d $(PEERS)/node_modules || { mkdir -p $(PEERS) \
   && npm install --silent --prefix $(PEERS) gltfpack@1.3.0; } || rm -rf $(PEERS)/node_modules
-bench-unit: setup ## Time a whole unit, and meshes of the same solids by the paper's chain, VTK, gltfpack and zmesh
+bench-unit: setup-dev ## Time a whole unit, and meshes of the same solids by the paper's chain, VTK, gltfpack and zmesh
 	@$(ZMESH)
 	@$(GLTFPACK)
 	PYTHONPATH=$(PEERS)/python GLTFPACK=$(PEERS)/node_modules/.bin $(BIN)/python tests/bench/unit.py
 
-bench-cells: setup ## Compare closed surfaces of touching cells with zmesh's  (ARGS=--large: about 1500 cells)
+bench-cells: setup-dev ## Compare closed surfaces of touching cells with zmesh's  (ARGS=--large: about 1500 cells)
 	@$(ZMESH)
 	PYTHONPATH=$(PEERS)/python $(WITH_ARGS) $(BIN)/python tests/bench/cells.py out/bench-cells ARGS
 
-bench-wrap: setup ## Compare closing holes on voxels with the first paper's chain on triangles (needs CGAL and g++)
+bench-wrap: setup-dev ## Compare closing holes on voxels with the first paper's chain on triangles (needs CGAL and g++)
 	$(BIN)/python tests/bench/wrap.py
 
-bench-serve: setup ## Measure the tree of bricks, picture quality by bytes loaded, and 50 clients for a minute
+bench-serve: setup-dev ## Measure the tree of bricks, picture quality by bytes loaded, and 50 clients for a minute
 	$(BIN)/python tests/bench/brick_curve.py
 	$(BIN)/python tests/bench/serve_load.py
 
 BENCH_VIEWER := tests/bench/viewer
-bench-viewer: $(READY) ## Compare the ray march with vtk.js, NiiVue, three's example and a float64 reference
+bench-viewer: $(DEV_READY) ## Compare the ray march with vtk.js, NiiVue, three's example and a float64 reference
 	@if ! command -v npm >/dev/null; then echo "bench-viewer: skipped: no node and npm"; \
 	elif [ -z "$$CHROMIUM" ]; then echo "bench-viewer: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else \
@@ -397,7 +409,7 @@ bench-viewer: $(READY) ## Compare the ray march with vtk.js, NiiVue, three's exa
 	  && "$$OLDPWD/$(BIN)/python" bench.py "$$OLDPWD/out/bench-viewer"; \
 	fi
 
-bench-fps: setup ## Measure the viewer's frames per second in headless Chromium, 64^3 to 512^3, mono and stereo
+bench-fps: setup-dev ## Measure the viewer's frames per second in headless Chromium, 64^3 to 512^3, mono and stereo
 	@mkdir -p out/samples
 	test -e out/samples/head-512.ome.tif || $(BIN)/python tests/bench/fps_volume.py out/samples/head-512.ome.tif 512
 	$(RUN) build out/samples/head-512.ome.tif --out=out/head-512 --workers="$$WORKERS" --preset mri --grid 1x1
@@ -409,38 +421,45 @@ wheel: setup out/wheel/constraints.txt ## Make a wheel and a source distribution
 
 # The versions that the tests run with, for `pip install --constraint`. Hashes are left out, because pip
 # would then require a hash of the wheel as well.
-out/wheel/constraints.txt: requirements.lock
+out/wheel/constraints.txt: requirements.lock requirements-dev.lock
 	@mkdir -p $(@D)
-	sed -n '/^[A-Za-z0-9]/s/ *\\$$//p' $< > $@
+	sed -n '/^[A-Za-z0-9]/s/ *\\$$//p' $^ > $@
 
-docs: $(READY) $(if $(DRAW),docs-pictures) ## Make the documentation as a site: out/docs (DRAW=1 draws its pictures again)
+docs: $(DEV_READY) $(if $(DRAW),docs-pictures) ## Make the documentation as a site: out/docs (DRAW=1 draws its pictures again)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Chromium draws the pages of three samples; the command draws the pictures of wrong and right iso-values
-docs-pictures: setup browser
+docs-pictures: setup-dev browser
 	$(MAKE) demo OUT=out/demo
 	$(MAKE) demo SAMPLE=cells OUT=out/cells
 	$(MAKE) demo SAMPLE=mri OUT=out/mri-demo
 	cd $(VIEWER) && npm run --silent docs-pictures -- ../out
 	$(BIN)/python docs/iso_value_pictures.py out/samples/cycif.ome.zarr out/iso-values
 
-notebook: setup ## Run docs/jupyter.ipynb and store it with its pictures
+notebook: setup-dev ## Run docs/jupyter.ipynb and store it with its pictures
 	$(BIN)/python docs/run_jupyter.py
 
-lock: setup ## Write requirements.lock again from pyproject.toml
-	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
-	  --no-emit-index-url --no-header --no-annotate --group dev pyproject.toml -o requirements.lock
+# The versions are chosen for users and developers at once. The second file has the packages that are not
+# in the first.
+LOCK := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+  --no-emit-index-url --no-header --no-annotate pyproject.toml
+lock: setup ## Write requirements.lock and requirements-dev.lock again from pyproject.toml
+	@mkdir -p out
+	$(BIN)/$(LOCK) --upgrade --group dev -o out/all.lock
+	$(BIN)/$(LOCK) --upgrade --group setup --constraints out/all.lock -o requirements.lock
+	awk 'NR == FNR { has[$$0]; next } /^[^ ]/ { new = !($$0 in has) } new' requirements.lock out/all.lock \
+	  > requirements-dev.lock
 
-platforms: setup ## Resolve the requirements for each system and Python, and write the table of docs/systems.md
+platforms: setup-dev ## Resolve the requirements for each system and Python, and write the table of docs/systems.md
 	$(BIN)/python docs/platforms.py
 
-licences: $(READY) ## Write docs/licences.md from the packages that are installed
+licences: $(DEV_READY) ## Write docs/licences.md from the packages that are installed
 	$(BIN)/python docs/licences.py
 
-format-table: $(READY) ## Write the table of formats in docs/input-formats.md from the formats' rows
+format-table: $(DEV_READY) ## Write the table of formats in docs/input-formats.md from the formats' rows
 	$(BIN)/python docs/format_table.py
 
-benchmarks: $(READY) ## Write docs/benchmarks.md from the figures in tests/bench/figures
+benchmarks: $(DEV_READY) ## Write docs/benchmarks.md from the figures in tests/bench/figures
 	$(BIN)/python docs/benchmarks.py
 
 clean: ## Remove .venv, the viewer's packages and build, and caches; builds in out/ stay

@@ -1,4 +1,4 @@
-"""Time `import stereocell` and `stereocell --help`, beside a Python that does nothing.
+"""Time the imports of a command and `stereocell --help`, beside a Python that does nothing.
 
 Prints minimum and median of ROUNDS processes; bytecode and files are in the system's cache.
 """
@@ -16,6 +16,7 @@ PROGRAMS = {
     "import stereocell": ["-c", "import stereocell"],
     "stereocell --help": ["-m", "stereocell.cli", "--help"],
     "stereocell build --help": ["-m", "stereocell.cli", "build", "--help"],
+    "imports of all phases of a build": ["-c", "import stereocell.building.phases"],
     "import stereocell; stereocell.build": ["-c", "import stereocell; stereocell.build"],
 }
 

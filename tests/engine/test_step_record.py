@@ -15,6 +15,7 @@ from packaging.utils import canonicalize_name
 
 from stereocell.engine import step_record as shipped
 from stereocell.engine.step_record import libraries_of
+from stereocell.planning.provenance import STEPS
 from stereocell.read.known_formats import known_formats
 from stereocell.storage.assets import find_asset
 from support import step_record
@@ -103,7 +104,8 @@ def test_make_lint_asks_for_a_version_where_a_constant_changed(tmp_path: Path) -
     without = shutil.ignore_patterns("__pycache__", "*.tif")
     for name in ("pipeline", "schemas", "usd_assets", "tests/support"):
         shutil.copytree(TOP / name, tmp_path / name, ignore=without)
-    shutil.copy2(TOP / "requirements.lock", tmp_path)
+    for lock in step_record.LOCKS:
+        shutil.copy2(lock, tmp_path)
     package = tmp_path / "pipeline" / PACKAGE.name
     denoise = package / "filters" / "denoise.py"
     constant = "SMOOTHING_REACH = 4.0"
@@ -259,3 +261,8 @@ def test_all_imported_packages_are_declared_as_dependencies() -> None:
             if top not in {*sys.stdlib_module_names, "stereocell", *BESIDE}:
                 owners = {canonicalize_name(package) for package in installed[top]}
                 assert owners & declared, f"{file.name} imports {top}"
+
+
+def test_steps_that_a_provenance_names_exist(recorded: dict[str, Any]) -> None:
+    assert set(STEPS) <= {step.__name__ for step in step_record.find_steps()}
+    assert set(STEPS) <= recorded["steps"].keys()

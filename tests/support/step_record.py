@@ -37,7 +37,7 @@ from stereocell.read.known_formats import known_formats
 from stereocell.storage.assets import find_asset
 
 PACKAGE = Path(stereocell.__file__).parent
-LOCK = PACKAGE.parents[1] / "requirements.lock"
+LOCKS = [PACKAGE.parents[1] / f"requirements{of}.lock" for of in ("", "-dev")]
 NEUTRAL = (
     "storage",
     "engine",
@@ -81,7 +81,8 @@ def record() -> dict[str, Any]:
     modules = {step.__module__ for step in find_steps()}
     modules |= {one.module for one in formats.values()}
     used = {library for module in modules for library in reach(module)[1]}
-    lines = re.findall(r"^([\w.-]+)(?:\[.*\])?==([^\s;]+)", LOCK.read_text("utf-8"), re.M)
+    text = "".join(lock.read_text("utf-8") for lock in LOCKS)
+    lines = re.findall(r"^([\w.-]+)(?:\[.*\])?==([^\s;]+)", text, re.M)
     locked = {canonicalize_name(name): version for name, version in lines}
     canonical = {name: canonicalize_name(name) for name in sorted(used, key=str.lower)}
     return {

@@ -39,7 +39,8 @@ def give_kernels(image: Image) -> None:
 
 def make_context(folder: Path) -> Path:
     """Return the folder that `make wheel` leaves, without the sdist."""
-    (folder / "requirements.lock").symlink_to(ROOT / "requirements.lock")
+    for lock in ("requirements.lock", "requirements-dev.lock"):
+        (folder / lock).symlink_to(ROOT / lock)
     context = Path("out/wheel")
     command = ["make", "-f", str(ROOT / "Makefile"), str(context / "constraints.txt")]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)

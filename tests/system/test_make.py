@@ -1,19 +1,24 @@
 """`make` passes variables on unchanged: a name with a quote stays a name and never runs."""
 
 import os
+import re
 import shutil
 import subprocess
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from stereocell.cli.__main__ import main
 from support.exhaustive import sweep
 from support.server.timeouts import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
+LOCKS = ("requirements.lock", "requirements-dev.lock")
 NAMES = (
     "plain", "two words", "it's", 'say "x"', "a$b", "$HOME", "$(HOME)", "$(touch pwned)",
     "$(shell touch pwned)", "`touch pwned`", "a; touch pwned", "a & touch pwned", "a | b > c",
@@ -38,6 +43,9 @@ case "$1" in
   build) make_file stage a; make_file bundle a; make_file report a ;;
 esac
 """
+# Make counts these files as up to date, so that it sets nothing up.
+READY = ("-o .venv/.ready -o .venv/.ready-dev -o .venv/.kernels "
+         "-o viewer_gltf/dist/index.html")  # fmt: skip
 Make = Callable[..., subprocess.CompletedProcess[str]]
 
 pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="no make")
@@ -65,9 +73,8 @@ def make(checkout: Path) -> Make:
     ) -> subprocess.CompletedProcess[str]:
         inherited = {k: v for k, v in os.environ.items() if not k.startswith(ours)}
         set_ = {"RUN": "./fake", **set_}
-        ready = ["-o", ".venv/.ready", "-o", "viewer_gltf/dist/index.html"]
         return subprocess.run(
-            ["make", *ready, *words, *(f"{name}={value}" for name, value in set_.items())],
+            ["make", *READY.split(), *words, *(f"{name}={value}" for name, value in set_.items())],
             cwd=checkout,
             env={**inherited, **(environment or {})},
             capture_output=True,
@@ -127,8 +134,7 @@ def test_phases_pass_names_on_unchanged_and_only_unfinished_phases_run(
 
 @pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
 def test_variables_reach_a_nested_make_unchanged(checkout: Path, make: Make, name: str) -> None:
-    ready = "-o .venv/.ready -o viewer_gltf/dist/index.html"
-    (checkout / "outer.mk").write_text(f"include Makefile\nagain:\n\t$(MAKE) {ready} serve\n")
+    (checkout / "outer.mk").write_text(f"include Makefile\nagain:\n\t$(MAKE) {READY} serve\n")
     assert make("-f", "outer.mk", "again", OUT=name, ARGS="--lan").returncode == 0
     assert calls(checkout) == [["serve", "--lan", "--", name]]
     assert not (checkout / "pwned").exists()
@@ -136,7 +142,8 @@ def test_variables_reach_a_nested_make_unchanged(checkout: Path, make: Make, nam
 
 @pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
 def test_demo_passes_names_on_unchanged(checkout: Path, make: Make, name: str) -> None:
-    made = make("demo", OUT=name, WORKERS=name, ARGS="--grid 1x1", SAMPLE="mri")
+    set_ = {"OUT": name, "WORKERS": name, "ARGS": "--grid 1x1", "SAMPLE": "mri"}
+    made = make("demo", MAKE=f"make {READY}", **set_)
     assert (made.returncode, made.stderr) == (0, "")
     sampled, built, checked = calls(checkout)
     place = "out/samples/head"
@@ -221,7 +228,7 @@ def test_programs_and_folders_may_have_hard_names(checkout: Path, make: Make) ->
     name = 'it\'s $(touch pwned) "py"; x'
     (checkout / name).write_text("#!/bin/sh\necho Python 3.9\nexit 1\n")
     (checkout / name).chmod(0o755)
-    for file in ("requirements.lock", "pyproject.toml"):
+    for file in (*LOCKS, "pyproject.toml"):
         (checkout / file).touch()
     refused = make("none/.ready", VENV="none", PYTHON=f"./{name}")
     assert refused.stderr.splitlines()[0] == (
@@ -256,7 +263,7 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
     ]
     made = make("--eval=show:; @echo $(VENV)", "show", PYTHON="python3")
     assert made.stdout.strip() == ".venv"  # the default takes any existing environment
-    for file in ("requirements.lock", "pyproject.toml"):
+    for file in (*LOCKS, "pyproject.toml"):
         (checkout / file).touch()
     refused = make("setup", PYTHON="./missing")
     assert refused.stderr.splitlines()[0] == (
@@ -269,7 +276,7 @@ def test_each_version_of_python_has_its_own_environment(checkout: Path, make: Ma
 def test_the_newest_python_is_found_in_pyenv_or_reported_as_missing(
     checkout: Path, make: Make
 ) -> None:
-    for name in ("requirements.lock", "pyproject.toml", "viewer_gltf"):
+    for name in (*LOCKS, "pyproject.toml", "viewer_gltf"):
         (checkout / name).symlink_to(ROOT / name)
     set_: dict[str, Any] = {"NEWEST": "3.99", "environment": {"PYENV_ROOT": str(checkout)}}
     missing = make("test-newest", **set_)
@@ -283,6 +290,22 @@ def test_the_newest_python_is_found_in_pyenv_or_reported_as_missing(
     assert (found.returncode, found.stderr) == (0, "")
     assert ".venv-3.99/bin/pytest" in found.stdout
     assert not list(checkout.parent.rglob("pwned"))
+
+
+def test_the_two_locks_agree_and_users_get_no_developers_packages() -> None:
+    entry = re.compile(r"^([\w.-]+)==(\S+)(?: ; (.*))? \\$", re.MULTILINE)
+    users, developers = (entry.findall((ROOT / lock).read_text("utf-8")) for lock in LOCKS)
+    names = {name for name, *_ in users}
+    # A package stands in both files only if developers need it on more systems.
+    assert {one for one in developers if one[0] in names} & set(users) == set()
+    assert {one[:2] for one in developers if one[0] in names} <= {one[:2] for one in users}
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["dependency-groups"]
+    asked = {
+        canonicalize_name(Requirement(line).name) for line in groups["dev"] if isinstance(line, str)
+    }
+    assert {"mypy", "pytest", "ruff"} <= asked - names
+    assert {canonicalize_name(Requirement(line).name) for line in groups["setup"]} <= names
+    assert asked <= names | {name for name, *_ in developers}
 
 
 @pytest.mark.slow

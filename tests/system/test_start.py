@@ -37,3 +37,13 @@ def test_a_start_imports_no_library(code: str, most: int | None) -> None:
     foreign = {name for name in roots - OURS if not name.startswith("__editable__")}
     assert foreign - set(sys.stdlib_module_names) == set()
     assert most is None or len(modules) <= most
+
+
+def test_a_plan_waits_for_no_library_of_later_phases() -> None:
+    code = "import stereocell.building.phases"
+    done = subprocess.run(
+        [sys.executable, "-c", code + TELL], capture_output=True, text=True, check=True
+    )
+    roots = {name.partition(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
+    assert "numpy" in roots
+    assert roots & {"pxr", "igl", "zarr", "vtkmodules", "OpenEXR"} == set()

@@ -3,18 +3,15 @@
 Before the units, passes find values that all tiles of a channel share: windows -> evidence ->
 levels -> components. Each phase is a function on OUT and skips finished work, because the name of a
 result is a key of everything that the result depends on.
+
+A phase imports its steps when it runs, because their libraries are slow to import. A plan, for
+example, needs no USD.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from stereocell.building.bundle_inputs import (
-    bundle_step,
-    remove_half_bundle,
-    require_kept_stage,
-    require_stage,
-)
 from stereocell.building.object_records import save_notes, table_of_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import (
@@ -40,23 +37,18 @@ from stereocell.planning.input_files import require_table
 from stereocell.planning.label_numbers import notes_on_objects
 from stereocell.planning.level_choice import find_level
 from stereocell.planning.level_estimate import notes_on_levels
-from stereocell.planning.object_steps import object_steps
 from stereocell.planning.plan import Plan
 from stereocell.planning.plan_notes import changes_of, print_notes, summary_of
 from stereocell.planning.provenance import provenance_record
 from stereocell.planning.settings import Settings, to_readable_toml
 from stereocell.planning.settle import settle
-from stereocell.planning.stage_steps import stage_step, stage_tile_step
 from stereocell.planning.survey import Survey
-from stereocell.planning.unit_steps import choose_units, longest_first, unit_steps
 from stereocell.read.image import printable
 from stereocell.read.source_place import require_apart
-from stereocell.steps.write_bundle import bundle_part_tasks, opened_stage, write_bundle
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.overwriting import is_forced
 from stereocell.storage.sealed_text import write_sealed_text
-from stereocell.usd.write_usdz import USDZ_NAME
 from stereocell.usd.written_files import describe_parts, read_stage_list
 
 
@@ -111,6 +103,9 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
 
     Raises SourceError if the source changed since the plan, TasksFailedError if units fail.
     """
+    from stereocell.planning.object_steps import object_steps
+    from stereocell.planning.unit_steps import choose_units, longest_first, unit_steps
+
     out_folder = OutFolder(out)
     plan = out_folder.plan()
     with phase_of(out_folder, "units") as phase:
@@ -178,6 +173,9 @@ def run_stage(out: Path, engine: Engine) -> None:
 
     Raises OutputError if units are missing or damaged, TasksFailedError if tiles fail.
     """
+    from stereocell.planning.stage_steps import stage_step, stage_tile_step
+    from stereocell.usd.write_usdz import USDZ_NAME
+
     out_folder = OutFolder(out)
     plan = out_folder.plan()
     with phase_of(out_folder, "stage") as phase:
@@ -235,13 +233,16 @@ def run_bundle(
 
     Raises OutputError if the stage is missing, StageError if it can't be read.
     """
+    from stereocell.building import bundle_inputs
+    from stereocell.steps.write_bundle import bundle_part_tasks, opened_stage, write_bundle
+
     out_folder = OutFolder(out)
     with phase_of(out_folder, "bundle") as phase:
-        path = require_stage(out_folder, stage)
+        path = bundle_inputs.require_stage(out_folder, stage)
         viewer = viewer_dist()
-        step = bundle_step(out_folder, path, viewer)
-        require_kept_stage(out_folder)
-        remove_half_bundle(out_folder)
+        step = bundle_inputs.bundle_step(out_folder, path, viewer)
+        bundle_inputs.require_kept_stage(out_folder)
+        bundle_inputs.remove_half_bundle(out_folder)
         if not is_forced():
             require_bundle(out_folder.bundle_dir)  # fails before the phase is recorded as begun
         if is_strict:  # checked even for a finished bundle, which may be made without --strict

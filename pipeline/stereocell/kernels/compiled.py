@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
+from numba.extending import register_jitable
 
 from stereocell.kernels.cache_place import cache_folder
 
@@ -19,6 +20,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 _CONFIG: Any = numba.config
 # Without this option, wrappers for C programs would be compiled that are never called.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+# Python never calls compiled parts of kernels, so they get no wrapper for its objects either.
+_INNER: dict[str, Any] = {**_OPTIONS, "forceinline": True, "no_cpython_wrapper": True}
 
 
 def kernel(function: F) -> F:
@@ -37,7 +40,7 @@ def in_place(function: F) -> F:
 
 def step(function: F) -> F:
     """Compile a small function into each kernel that calls it, with the options of `in_place`."""
-    return numba.njit(forceinline=True, _nrt=False, **_OPTIONS)(function)
+    return register_jitable(_nrt=False, **_INNER)(function)
 
 
 def _cached(compiled: Any, function: F) -> F:
@@ -54,4 +57,4 @@ def _cached(compiled: Any, function: F) -> F:
 
 def part(function: F) -> F:
     """Compile a small function into each kernel that calls it."""
-    return numba.njit(forceinline=True, **_OPTIONS)(function)
+    return register_jitable(**_INNER)(function)

@@ -190,9 +190,11 @@ def smooth_in_place(
                 for k in range(0 if z == 0 else z + 1, min(z + 2, depth)):
                     _find_extremes(field[k], least[k % 3], most[k % 3], low, high)
                 if z == 0:
-                    least[2], most[2] = least[0], most[0]
+                    copy_plane(least[0], least[2])
+                    copy_plane(most[0], most[2])
                 if z + 1 == depth:
-                    least[(z + 1) % 3], most[(z + 1) % 3] = least[z % 3], most[z % 3]
+                    copy_plane(least[z % 3], least[(z + 1) % 3])
+                    copy_plane(most[z % 3], most[(z + 1) % 3])
                 _clip_hot_voxels(field[z], measured[z % len(measured)], least, most)
             elif is_bounded:
                 copy_plane(field[z], measured[z % len(measured)])

@@ -17,9 +17,10 @@ def fill_fans(mesh: Mesh, triangles: Ints, locked: Flags) -> None:
     """Write the half-edges of a surface, and mark vertices that stay: locked or on a border."""
     twins = match_twins(triangles, len(mesh.start))
     start, valence = count_fans(triangles, twins, len(mesh.start))
-    mesh.stays[:] = find_fixed(locked, triangles.ravel(), twins, valence)
+    stays = find_fixed(locked, triangles.ravel(), twins, valence)
     fill_records(triangles, twins, start, mesh.edges)
-    mesh.start[:] = start
+    for u in range(len(start)):  # a slice would take seconds to compile, see `copying`
+        mesh.stays[u], mesh.start[u] = stays[u], start[u]
 
 
 @step

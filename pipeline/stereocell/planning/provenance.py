@@ -8,19 +8,13 @@ from stereocell.model.version import GENERATOR
 from stereocell.planning.plan import Plan
 from stereocell.planning.settings import to_dict
 from stereocell.read.known_formats import format_of
-from stereocell.steps.build_unit import BuildUnit
-from stereocell.steps.find_window import FindWindow
-from stereocell.steps.gather_evidence import GatherEvidence
-from stereocell.steps.sum_components import SumComponents
-from stereocell.steps.write_stage_tile import WriteStageTile
 from stereocell.textures.map_packages import (
     UNWRAPPER,
 )
 
-# Steps whose libraries are named in the provenance of a stage.
-_STEPS = tuple(
-    step.__name__ for step in (FindWindow, GatherEvidence, SumComponents, BuildUnit, WriteStageTile)
-)
+# Steps whose libraries are named in the provenance of a stage. They are not imported, because a
+# plan would then import the libraries of all steps.
+STEPS = ("FindWindow", "GatherEvidence", "SumComponents", "BuildUnit", "WriteStageTile")
 
 
 def provenance(plan: Plan) -> dict[str, Any]:
@@ -36,7 +30,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "spacing_um": list(plan.spacing_um),
         "settings": settings,
         "libraries": {
-            **libraries_of(*_STEPS, *sorted(formats)),
+            **libraries_of(*STEPS, *sorted(formats)),
             **({UNWRAPPER: version_of(UNWRAPPER)} if plan.settings.unwrap.maps else {}),
         },
         **_added(plan),

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.formats.ome_zarr_write import write_probabilities
 from stereocell.model.errors import OutputError
 from stereocell.model.spacing import Point, Spacing
 from stereocell.storage.atomic_write import replacing_folder
@@ -69,6 +68,8 @@ class TissueFolder:
 
     def write(self, place: Path, result: TissueClasses) -> None:
         """Write the folder completely or not at all. Raises OutputError."""
+        from stereocell.formats.ome_zarr_write import write_probabilities  # zarr is slow to import
+
         with replacing_folder(place) as folder:
             write_probabilities(
                 folder / VOXELS,

@@ -39,7 +39,6 @@ CHANNEL_API = "StereoCellChannelAPI"
 SPECIMEN_API = "StereoCellSpecimenAPI"
 PATIENT_API = "StereoCellPatientAPI"
 SURFACE_API = "StereoCellSurfaceAPI"
-LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
 
 # Attributes of the tiles' group: directions (x, y, z) to the patient's sides, along its own axes
 SIDES = {

@@ -45,7 +45,6 @@ from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import (
     BROADCAST,
     DISPLAY_SCALE,
-    LAYER_SUFFIXES,
     OPENING_CUT,
     PATIENT_API,
     ROOT,
@@ -65,7 +64,7 @@ from stereocell.usd.write_nvindex import write_nvindex
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
 from stereocell.usd.written_files import CONTENTS_NAME, DISPLAY_NAME, STAGE_NAME
 
-__all__ = ["LAYER_SUFFIXES", "SUBLAYERS", "TileExtent", "is_layer", "write_stage", "write_tile"]
+__all__ = ["SUBLAYERS", "TileExtent", "is_layer", "write_stage", "write_tile"]
 
 # Sublayers of contents.usda, strongest first
 SUBLAYERS = ("./looks/channels.usda", "./looks/lights.usda")

@@ -28,11 +28,11 @@ from stereocell.storage.file_list import (
     read_list,
 )
 from stereocell.storage.workspace import cached, fetch, is_file
-from stereocell.usd.layer import LAYER_SUFFIXES, is_layer
 
 FILES, STAGE_NAME, CONTENTS_NAME = "files.json", "stage.usda", "contents.usda"
 NVINDEX_NAME = "nvindex.usda"
 DISPLAY_NAME = "display.usda"
+LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
 CHANGED = "changed since it was written, by an edit or by damage"
 DOUBTFUL = "changed since it was written but kept its size, by damage or by an edit"
 REMEDY = "run `stereocell stage OUT`"
@@ -95,6 +95,8 @@ def find_damage(root: Path, listed: FileList, *, since: Path | None = None) -> d
 
 def _name_fault(file: Path, entry: Mapping[str, Any]) -> str:
     """Return the fault of a file that differs from the list: DAMAGED, CHANGED or DOUBTFUL."""
+    from stereocell.usd.layer import is_layer  # USD is slow to import
+
     if file.suffix not in LAYER_SUFFIXES:
         return DAMAGED
     with cached(file):
