@@ -195,18 +195,16 @@ def _buffers(grid: Grid, leaves: Leaves) -> list[bytes]:
 def _holds(buffers: memoryview, grid: Grid, leaves: Leaves) -> bool:
     """Return whether buffers hold every leaf's mask and active values, and nothing else."""
     unpack = _unpack_halves if grid.is_half else _unpack_floats
-    width, parts, start, at = leaves.values.itemsize, [], 0, 0
+    values, start, at = leaves.values.data, 0, 0
     for mask, end in zip(_coded_masks(leaves), leaves.ends, strict=True):
         (size,) = _SIZE.unpack_from(buffers, at + len(mask))
-        first = at + len(mask) + _SIZE.size
+        first, expected = at + len(mask) + _SIZE.size, values[start:end].tobytes()
         packed = buffers[first : first + abs(size)]
-        numbers = bytes(packed) if size < 0 else unpack(packed, width * (end - start))
-        if len(numbers) != width * (end - start) or bytes(buffers[at : at + len(mask)]) != mask:
+        numbers = packed.tobytes() if size < 0 else unpack(packed, len(expected))
+        if numbers != expected or buffers[at : at + len(mask)].tobytes() != mask:
             return False
-        parts.append(numbers)
         start, at = end, first + abs(size)
-    found = np.frombuffer(b"".join(parts), np.uint8)
-    return at == len(buffers) and np.array_equal(found, leaves.values.view(np.uint8))
+    return at == len(buffers)
 
 
 def _coded_masks(leaves: Leaves) -> list[bytes]:
