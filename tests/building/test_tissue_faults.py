@@ -295,7 +295,7 @@ def test_a_full_disk_is_one_line_and_earlier_results_stay(
         assert digests(out / "bundle") == bundle
         if room <= 8:
             assert digests(out) == before
-        if not (out / "tissue").exists() or room <= 100:
+        if not (out / "tissue").exists() or room <= 40:  # with more room, the stage is begun
             assert faults(out) == []
     assert codes.count(1) >= 3
     resize(512 << 10)
