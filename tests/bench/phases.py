@@ -108,7 +108,7 @@ def run_phases(
             arguments = ["plan", "-o", str(out), *plan]
         elif phase == "check":
             arguments += ["--deep", *how]
-        elif phase != "report":
+        else:
             arguments += how
         before = measure_reference()
         cost = costs[phase] = watch(arguments, others)
