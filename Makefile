@@ -76,7 +76,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-build bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -329,6 +329,9 @@ careless: setup browser ## Use a bundle's page carelessly by script for ten minu
 
 bench: setup ## Compare pairs of alternatives in one run (ratios of medians)
 	$(BIN)/python tests/bench/bench.py
+
+bench-build: setup ## Measure each phase of a build of INPUT into OUT, with the check  (WORKERS=1 ARGS="--preset mri")
+	$(WITH_ARGS) $(BIN)/python tests/bench/phases.py "$$OUT" "$$WORKERS" "$$INPUT" ARGS
 
 bench-live: setup ## Time `stereocell view SOURCE`: first picture, its colours, and answers while a build runs
 	$(BIN)/python tests/bench/live_view.py

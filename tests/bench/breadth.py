@@ -17,6 +17,7 @@ import zarr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import make_sample
+from machine import stated
 from phases import MB, PHASES, Cost, run_phases
 
 from stereocell.building.out_folder import OutFolder
@@ -71,9 +72,10 @@ def main(folder: Path, grids: tuple[tuple[int, int], ...]) -> None:
 
 
 if __name__ == "__main__":
-    _, place, *given = sys.argv
-    chosen = tuple(
-        (int(columns), int(rows))
-        for columns, rows in (each.split("x") for each in given[0].split(","))
-    ) if given else GRIDS  # fmt: skip
-    main(Path(place), chosen)
+    with stated():
+        _, place, *given = sys.argv
+        chosen = tuple(
+            (int(columns), int(rows))
+            for columns, rows in (each.split("x") for each in given[0].split(","))
+        ) if given else GRIDS  # fmt: skip
+        main(Path(place), chosen)

@@ -21,7 +21,7 @@ from threading import Thread
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-
+from machine import stated
 from websockets.sync.client import connect
 
 from stereocell.cli.__main__ import main as stereocell
@@ -176,4 +176,5 @@ def stretch(level: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else DATA))
+    with stated():
+        sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else DATA))

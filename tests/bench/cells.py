@@ -42,6 +42,7 @@ from cell_truth import (
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from machine import stated
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.meshes.distance import Nearest
@@ -334,4 +335,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with stated():
+        main()

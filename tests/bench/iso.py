@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 from skimage import filters
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from machine import stated
 
 from corpus import all_cases
 from corpus.case import Mask
@@ -289,4 +290,5 @@ def print_cases(cases: list[Figures]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with stated():
+        main()

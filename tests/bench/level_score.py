@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from machine import stated
 
 from corpus import all_cases
 from corpus.level_search import search_levels
@@ -177,4 +178,5 @@ def _print(
 
 
 if __name__ == "__main__":
-    main()
+    with stated():
+        main()

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from live_view import SOURCES
+from machine import stated
 from numpy.typing import NDArray
 from PIL import Image
 from skimage.color import deltaE_ciede2000, rgb2lab
@@ -86,4 +87,5 @@ def difference(first: NDArray[np.float64], second: NDArray[np.float64]) -> float
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    with stated():
+        main(sys.argv[1:])

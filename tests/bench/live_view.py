@@ -24,6 +24,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from machine import stated
+
 ROUNDS = 3
 REQUESTS = 200
 DATA = Path(os.environ.get("STEREOCELL_DATA", "../shared/data")).resolve()
@@ -154,4 +156,5 @@ def cpu_s(process: int) -> float:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    with stated():
+        main(sys.argv[1:])

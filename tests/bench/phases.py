@@ -1,6 +1,15 @@
-"""Run the phases of a build one after another as commands, and measure each."""
+"""Run the phases of a build one after another as commands, and measure each.
 
+    python phases.py OUT WORKERS INPUT [FLAGS OF PLAN ...]
+
+Prints seconds, CPU seconds and peak memory of each phase. Beside each stand the CPU seconds in
+units of the reference kernel, which ran just before and after it (see machine.py), and the load.
+OUT is replaced.
+"""
+
+import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections import defaultdict
@@ -8,7 +17,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import STEREOCELL
+from machine import load, measure_reference, stated
 
 from support.worker_processes import workers_of
 
@@ -19,11 +31,23 @@ MB = 1e6
 
 @dataclass
 class Cost:
-    """Cost of a command: seconds, CPU seconds, and peak bytes of a process by role."""
+    """Cost of a command.
+
+    seconds    time from start to end
+    cpu        CPU seconds of all its processes
+    reference  CPU seconds of the reference kernel, before and after the command
+    peaks      peak bytes of a process by role
+    """
 
     seconds: float = 0.0
     cpu: float = 0.0
+    reference: float = 0.0
     peaks: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+
+    @property
+    def references(self) -> float:
+        """Return the CPU seconds in units of the reference kernel."""
+        return self.cpu / self.reference
 
 
 def watch(arguments: list[str], others: list[psutil.Process]) -> Cost:
@@ -86,10 +110,28 @@ def run_phases(
             arguments += ["--deep", *how]
         elif phase != "report":
             arguments += how
+        before = measure_reference()
         cost = costs[phase] = watch(arguments, others)
+        cost.reference = (before + measure_reference()) / 2
         peaks = ", ".join(f"{role} {most / MB:.0f}" for role, most in cost.peaks.items())
-        print(f"  {phase:7}{cost.seconds:8.1f} s {cost.cpu:8.1f} s of CPU   peak, MB: {peaks}",
-              flush=True)  # fmt: skip
-    total = sum(cost.seconds for cost in costs.values())
-    print(f"  in all {total / 60:.1f} minutes, {sum(c.cpu for c in costs.values()):.0f} s of CPU")
+        print(f"  {phase:7}{cost.seconds:8.1f} s {cost.cpu:8.1f} s of CPU, "
+              f"{cost.references:6.1f} references of {cost.reference:.3f} s   "
+              f"load {load():.1f}   peak, MB: {peaks}", flush=True)  # fmt: skip
+    build = [cost for phase, cost in costs.items() if phase != "check"]
+    for name, some in (("the build", build), ("with the check", [*costs.values()])):
+        print(f"  {name}: {sum(cost.seconds for cost in some) / 60:.1f} minutes, "
+              f"{sum(cost.cpu for cost in some):.0f} s of CPU, "
+              f"{sum(cost.references for cost in some):.0f} references")  # fmt: skip
     return costs
+
+
+def main() -> None:
+    """Build one input and print what each phase costs."""
+    _, out, workers, *plan = sys.argv
+    shutil.rmtree(out, ignore_errors=True)
+    run_phases(Path(out), plan, ["--workers", workers], [])
+
+
+if __name__ == "__main__":
+    with stated():
+        main()

@@ -27,6 +27,7 @@ import zarr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import STEREOCELL, make_sample, plan
+from machine import stated
 from reading import (
     CHANNELS,
     MAX_READ,
@@ -236,5 +237,6 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
 
 
 if __name__ == "__main__":
-    given = tuple(int(n) for n in (sys.argv[2] if len(sys.argv) > 2 else "48,96,96").split(","))
-    sys.exit(main(Path(sys.argv[1]), given))  # type: ignore[arg-type]
+    with stated():
+        given = tuple(int(n) for n in (sys.argv[2] if len(sys.argv) > 2 else "48,96,96").split(","))
+        sys.exit(main(Path(sys.argv[1]), given))  # type: ignore[arg-type]

@@ -22,6 +22,7 @@ import psutil
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import make_sample
+from machine import stated
 from phases import MB, Cost, run_phases
 
 from stereocell.formats.vdb import MEASURED_NAME
@@ -107,8 +108,9 @@ def main(
 
 
 if __name__ == "__main__":
-    _, place, *given = sys.argv
-    columns, rows = map(int, given[0].split("x")) if given else GRID
-    z, y, x = map(int, given[1].split(",")) if len(given) > 1 else TILE
-    chosen = tuple(given[2].split(",")) if len(given) > 2 else WAYS
-    sys.exit(main(Path(place), (columns, rows), (z, y, x), chosen))
+    with stated():
+        _, place, *given = sys.argv
+        columns, rows = map(int, given[0].split("x")) if given else GRID
+        z, y, x = map(int, given[1].split(",")) if len(given) > 1 else TILE
+        chosen = tuple(given[2].split(",")) if len(given) > 2 else WAYS
+        sys.exit(main(Path(place), (columns, rows), (z, y, x), chosen))

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-
+from machine import stated
 from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 
@@ -176,4 +176,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with stated():
+        sys.exit(main())

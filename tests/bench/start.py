@@ -8,6 +8,8 @@ import subprocess
 import sys
 import time
 
+from machine import stated
+
 ROUNDS = 15
 PROGRAMS = {
     "python": ["-c", ""],
@@ -29,4 +31,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with stated():
+        main()

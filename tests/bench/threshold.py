@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from machine import stated
 
 import stereocell.read
 from stereocell.model.tiling import Box
@@ -56,4 +57,5 @@ def main(images: str | None) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[2] if sys.argv[1:2] == ["--images"] else None)
+    with stated():
+        main(sys.argv[2] if sys.argv[1:2] == ["--images"] else None)

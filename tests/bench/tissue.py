@@ -9,6 +9,7 @@ import time
 from typing import Any
 
 import numpy as np
+from machine import stated
 from numpy.typing import NDArray
 from published import publish
 from skimage.filters import threshold_multiotsu
@@ -73,4 +74,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with stated():
+        main()

@@ -29,6 +29,7 @@ import cc3d
 import numpy as np
 import pyvista as pv
 import trimesh
+from machine import stated
 from wrap import (
     ALPHA,
     SAMPLES,
@@ -247,4 +248,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with stated():
+        main()

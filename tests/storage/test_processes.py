@@ -1,7 +1,10 @@
-"""The number of cores that this process may use."""
+"""The number of cores that this process may use, and the memory that it keeps."""
 
 import math
 import os
+import platform
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -46,3 +49,21 @@ def test_the_quota_is_that_of_the_container_s_group(
         file.write_text(text + "\n")
         file.with_name("cpu.cfs_period_us").write_text("100000\n")
     assert container_cores(tmp_path) == expected
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc has these settings")
+def test_a_process_that_keeps_its_memory_does_not_ask_the_system_for_it_again() -> None:
+    def pages(arrays: int, prepare: str) -> int:
+        """Return how many pages the system gives to arrays of 64 MB, one after another."""
+        code = (
+            "import resource, numpy as np\n"
+            "from stereocell.storage.processes import keep_freed_memory\n"
+            f"{prepare}\n"
+            f"for _ in range({arrays}): np.ones(8_000_000)\n"
+            "print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)"
+        )
+        command = [sys.executable, "-c", code]
+        return int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+    nothing, returned, kept = pages(0, ""), pages(10, ""), pages(10, "keep_freed_memory()")
+    assert kept - nothing < 0.2 * (returned - nothing), (nothing, returned, kept)

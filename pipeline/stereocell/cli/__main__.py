@@ -16,7 +16,7 @@ from stereocell.cli.places import FORCE, PLACES, require_place
 from stereocell.cli.words import prepared
 from stereocell.engine.interrupts import Terminated, answering_sigterm
 from stereocell.model.errors import StereoCellError, UsageError
-from stereocell.storage.processes import require_address_space, shortage
+from stereocell.storage.processes import keep_freed_memory, require_address_space, shortage
 
 # New objects between two garbage collections. With Python's default of 700, collections take a
 # tenth of a command's time.
@@ -52,6 +52,8 @@ def _main(words: Sequence[str]) -> int:
     options = argparse.Namespace(json="--json" in words)  # replaced once the words are parsed
     try:
         options = parse(words)
+        if options.command not in LIGHT | SHOWERS:
+            keep_freed_memory()
         with answering_sigterm():
             return _run(options)
     except (StereoCellError, MemoryError, RuntimeError, ImportError, OSError) as error:

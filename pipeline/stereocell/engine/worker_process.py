@@ -12,6 +12,8 @@ from multiprocessing import connection, parent_process
 from multiprocessing.connection import Connection
 from typing import Any
 
+from stereocell.storage.processes import keep_freed_memory
+
 READY = "ready"  # first answer of a worker, once it has started
 
 
@@ -20,6 +22,7 @@ def serve(pipe: "Connection[Any, Any]") -> None:
 
     A request is the pickled (function, task). The answer is (result, None) or (None, error).
     """
+    keep_freed_memory()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the command itself reacts to Ctrl-C
     threading.Thread(target=end_with_parent, daemon=True).start()
     try:

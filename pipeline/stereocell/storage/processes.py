@@ -1,11 +1,13 @@
 """Look up other processes of this machine, and the resources that this process may use."""
 
+import ctypes
 import errno
 import hashlib
 import math
 import os
 import re
 import socket
+import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,6 +23,24 @@ _SIGNS = re.compile(
     r"insufficient memory|not enough memory|out of memory",
     re.IGNORECASE,
 )
+_M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # parameters of glibc's `mallopt`
+
+
+def keep_freed_memory() -> None:
+    """Let this process keep the memory that it frees, for its next arrays.
+
+    By default glibc returns each large array to the system. Linux then clears every page again when
+    the next array is filled, which takes a sixth of a build's CPU time. The peak of the memory
+    grows by a few percent. Other C libraries lack these settings, and nothing changes there.
+
+    Reference: https://www.gnu.org/software/libc/manual/html_node/Malloc-Tunable-Parameters.html
+    """
+    if sys.platform != "linux":
+        return
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, "mallopt"):
+        libc.mallopt(_M_MMAP_MAX, 0)
+        libc.mallopt(_M_TRIM_THRESHOLD, -1)
 
 
 def cores() -> int:
