@@ -47,7 +47,7 @@ class LevelSearch:
     values: NDArray[np.float32]
     padding: Mask
     tiles: tuple[tuple[Slices, TileEvidence], ...]
-    scale: Scale
+    counting: Counting
     found: ChannelLevels
 
 
@@ -101,7 +101,7 @@ def search_levels(case: Case) -> LevelSearch:
     values = denoise(volume, sigma, max_shift)
     if found.subtracts and under is not None:
         values -= under
-    return LevelSearch(case, truth, field, above, values, padding, tiles, scale, found)
+    return LevelSearch(case, truth, field, above, values, padding, tiles, counting, found)
 
 
 def _slices_of(under: NDArray[np.float32], first: int, stop: int) -> NDArray[np.float32]:

@@ -191,7 +191,7 @@ def test_tiles_without_voxels_have_no_level() -> None:
     search = search_levels(EMPTY["empty, scmos, plain"])
     bare = [replace(tile, plain=_none(tile.plain), padding=_none(tile.padding), above=None)
             for _, tile in search.tiles]  # fmt: skip
-    found = find_levels(bare, counting=Counting(search.scale, None, 0.0), finest_um=1.0)
+    found = find_levels(bare, counting=Counting(search.counting.scale, None, 0.0), finest_um=1.0)
     assert found.all_levels == ()
     assert found.clear == ()
 

