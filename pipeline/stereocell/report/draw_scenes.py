@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image
 
 from stereocell.preview.draw_slices import encode
+from stereocell.steps.unit_files import load_surface
 from stereocell.textures.draw_meshes import Box, Shape, draw_pixels
 
 
@@ -49,7 +50,7 @@ class Picture:
 
 
 def draw_scene(scene: Scene) -> Picture:
-    """Draw a scene of meshes and boxes; return the picture."""
+    """Draw a scene of meshes and boxes; return the picture. Raises OutputError."""
     shapes = map(_load, scene.surfaces)
     image = Image.fromarray(draw_pixels(shapes, scene.frame, scene.size, boxes=scene.boxes))
     return Picture(encode(image), *image.size)
@@ -63,8 +64,4 @@ def draw_image(
 
 
 def _load(surface: Surface) -> Shape:
-    with np.load(surface.file) as arrays:
-        positions, triangles, normals = (
-            arrays[name] for name in ("positions", "triangles", "normals")
-        )
-    return Shape(positions, triangles, normals, np.array(surface.color))
+    return Shape(*load_surface(Path(surface.file)), np.array(surface.color))
