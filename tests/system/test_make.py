@@ -94,8 +94,8 @@ def calls(checkout: Path) -> list[list[str]]:
 
 
 def phases(source: str, out: str) -> list[list[str]]:
-    later = [[phase, "--workers=3", "--", out] for phase in ("units", "stage", "bundle")]
-    return [["plan", f"--out={out}", "--", source], *later, ["report", "--", out]]
+    later = [[phase, "--workers=3", "--", out] for phase in ("units", "stage", "bundle", "report")]
+    return [["plan", f"--out={out}", "--", source], *later]
 
 
 @pytest.mark.parametrize("name", sweep(NAMES, kept=KEPT))
