@@ -22,7 +22,7 @@ from support.step_record import find_steps
 SHAPE = (16, 24, 48)
 # Fields that another field stands for, or that only name a place
 PLACES = {("SourceRef", "source"), ("Labels", "name"), ("Labels", "shape"), ("Labels", "color")}
-PLACES |= {("WriteStageTile", "stage_dir")}
+PLACES |= {("WriteStageTile", "stage_dir"), ("WriteStageTile", "parts_dir")}
 
 
 @pytest.fixture(scope="module")

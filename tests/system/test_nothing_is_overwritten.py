@@ -68,7 +68,7 @@ BEGINNINGS = (
     "building.phases.remove_mixed",
     "steps.write_stage_tile.WriteStageTile.run",
     "building.tissue._learn",
-    "building.phases.opened_stage",
+    "steps.write_bundle.opened_stage",
     "export.write.Chosen",
     "export.write.write_scene",
     "preview.iso_value.window_step",
