@@ -43,7 +43,10 @@ class UnitPart:
         return [self.channel_id, self.folder.name, self.color, content_of(self.paint)]
 
     def content(self, *, has_volume: bool) -> ChannelContent:
-        """Return what the unit's folder holds. Raises OutputError if a file is damaged."""
+        """Return what the unit's folder holds. Raises OutputError if a file is damaged.
+
+        has_volume  whether the voxels are loaded
+        """
         volume, measured = load_voxels(self.folder) if has_volume else (None, None)
         return ChannelContent(
             self.channel_id,
@@ -95,7 +98,7 @@ class WriteStageTile(Step[StageTile]):
     has_vdb    whether the volumes are written for other programs, too
     shared     IDs of channels that only have a surface, because their volume is another channel's
     stage_dir  folder of the stage, where an artist may edit the tile's files
-    parts_dir  folder in which `parts` wrote the files of its channels; None: `run` writes them
+    parts_dir  folder in which `part_tasks` wrote the channels' files; None: `run` writes them
     """
 
     VERSION: ClassVar[int] = 3
@@ -149,19 +152,17 @@ class WriteStageTile(Step[StageTile]):
     def run(self) -> StageTile:
         """Write the tile. Raises OutputError if a unit or a part is damaged."""
         tables = {one.labels_id: one for one in self.tables}
-        channels = []
-        for unit in self.units:
-            one, table = (
-                unit.content(has_volume=self.has_volume(unit)),
-                tables.get(unit.channel_id),
-            )
-            if table is not None:
-                one = replace(one, objects=table.table, touching=table.touching)
-            channels.append(one)
         parts = None
         if self.parts_dir is not None:
             places = [self._part_of(unit) for unit in self.units]
             parts = {place: _written(self.FORM.read(place / _RECORD)) for place in places}
+        channels = []
+        for unit in self.units:
+            # voxels lie in the parts already
+            one = unit.content(has_volume=parts is None and self.has_volume(unit))
+            if (table := tables.get(unit.channel_id)) is not None:
+                one = replace(one, objects=table.table, touching=table.touching)
+            channels.append(one)
         content = replace(self.content, channels=tuple(channels))
         written = write_tile(self.stage_dir, content, has_vdb=self.has_vdb, parts=parts)
         return StageTile(self.key, written.files, written.measured_bytes)

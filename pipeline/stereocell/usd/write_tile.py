@@ -17,7 +17,7 @@ two limits the detail of the bundle, but a coarser level does (usd/read_variants
 """
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -89,8 +89,9 @@ def write_tile(
     """Write the folder `stage_dir`/tiles/<tile>/, and replace an older one.
 
     has_vdb  whether volumes get OpenVDB fields, which other programs draw
-    parts    folders of the files of all channels, which `write_channel` wrote, and are moved into
-             the tile's; None: the files are written here
+    parts    folders of the files of all channels, in their order, which `write_channel` wrote.
+             They are moved into the tile's folder, and the channels need no voxels. None: the files
+             are written here
 
     Tiles do not depend on each other. Raises OutputError if a file can't be written, and ValueError
     (a bug) if the shape of a volume does not fit its tile.
@@ -105,7 +106,7 @@ def write_tile(
             for part, one in parts.items():
                 for name in one.files:
                     move(part / name, folder / name)
-        export(_compose(tile, has_vdb), folder / LAYER_NAME)
+        export(_compose(tile, written), folder / LAYER_NAME)
         files = {LAYER_NAME: measure(folder / LAYER_NAME)}
         files |= {name: dict(entry) for one in written for name, entry in one.files.items()}
         measured_bytes = sum(one.measured_bytes for one in written)
@@ -145,36 +146,53 @@ def has_mesh(stage_dir: Path, tile_id: str, channel_id: str) -> bool:
     return layer.GetPrimAtPath(prim) is not None
 
 
+def _fields_name(channel: ChannelContent) -> str:
+    return f"{channel.channel_id}.vdb"
+
+
+def _atlas_name(channel: ChannelContent) -> str:
+    return f"{channel.channel_id}.exr"
+
+
 def _closed_name(channel_id: str) -> str:
     return f"{channel_id}_closed.stl"
 
 
-def _compose(tile: TileContent, has_vdb: bool) -> Sdf.Layer:
-    """Return the layer of a tile, tile.usdc, before it is written."""
+def _compose(tile: TileContent, written: Sequence[Written]) -> Sdf.Layer:
+    """Return the layer of a tile, tile.usdc, before it is written.
+
+    written  files of each channel, to which the layer refers
+    """
     stage = new_stage(".usdc", tile.id)
     root = UsdGeom.Xform.Define(stage, Sdf.Path.absoluteRootPath.AppendChild(tile.id)).GetPrim()
     Usd.ModelAPI(root).SetKind(Kinds.Tokens.component)
-    for channel in tile.channels:
+    for channel, own in zip(tile.channels, written, strict=True):
         branch = UsdGeom.Xform.Define(stage, root.GetPath().AppendChild(channel.channel_id))
         branch.GetPrim().SetDisplayName(from_identifier(channel.channel_id))
         branch.GetPrim().GetInherits().AddInherit(SHOWN.AppendChild(channel.channel_id))
         _define_look(branch, tile, channel)
         if channel.lods:
             _define_mesh(branch, tile, channel)
-        if channel.volume is not None:
-            volume = _define_volume(branch, tile, channel, channel.volume)
-            if has_vdb:
-                _define_fields(volume, channel)
+        if _atlas_name(channel) in own.files:
+            volume = _define_volume(branch, tile, channel)
+            if _fields_name(channel) in own.files:
+                _define_fields(volume, channel, has_measured=own.measured_bytes > 0)
     _author_lods(root, tile)
-    _author_representations(root, tile)
+    _author_representations(root, tile, written)
     return stage.GetRootLayer()
 
 
-def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
+def _volume_shape(tile: TileContent) -> tuple[int, int, int]:
+    """Return the number of voxels (z, y, x) of the tile's volumes, with their apron."""
     box = np.subtract(tile.last_um, tile.first_um) / tile.spacing_um
-    expected = tuple(int(n) for n in np.rint(box).astype(int) + 1 + 2 * APRON)
+    depth, height, width = (int(n) + 1 + 2 * APRON for n in np.rint(box))
+    return depth, height, width
+
+
+def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
     if channel.volume is None:
         return
+    expected = _volume_shape(tile)
     if channel.volume.shape != expected or channel.volume.dtype != np.uint8:
         found = f"{channel.volume.dtype} {channel.volume.shape}"
         raise ValueError(f"{tile.id}/{channel.channel_id}: {found}, expected uint8 {expected}")
@@ -189,7 +207,7 @@ def _write_files(
     """Write the files of a channel, and yield the path of each."""
     if channel.volume is not None and has_vdb:
         write_vdb(
-            fields := folder / f"{channel.channel_id}.vdb",
+            fields := folder / _fields_name(channel),
             channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)],
             first_um=tile.first_um,
             spacing_um=tile.spacing_um,
@@ -198,7 +216,7 @@ def _write_files(
         )
         yield fields
     if channel.volume is not None:
-        write_atlas(atlas := folder / f"{channel.channel_id}.exr", channel.volume)
+        write_atlas(atlas := folder / _atlas_name(channel), channel.volume)
         yield atlas
     if channel.closed is not None:
         yield shutil.copyfile(channel.closed, folder / _closed_name(channel.channel_id))
@@ -257,7 +275,7 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
 
 
 def _define_volume(
-    branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent, voxels: NDArray[np.uint8]
+    branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent
 ) -> UsdVol.Volume:
     """Define the volume, and refer to the file with its voxels that the bundle reads."""
     stage = branch.GetPrim().GetStage()
@@ -268,12 +286,10 @@ def _define_volume(
     first, spacing = np.asarray(tile.first_um), np.asarray(tile.spacing_um)
     low, high = world_box(first - spacing / 2, first + (np.asarray(tile.own_shape) - 0.5) * spacing)
     volume.CreateExtentAttr(vec3f([low, high]))
-    depth, height, width = voxels.shape
+    depth, height, width = _volume_shape(tile)
     low, high = world_box(tile.first_um, tile.last_um)
     prim = volume.GetPrim()
-    set_attribute(
-        prim, "stereocell:atlas", _Types.Asset, f"./{channel.channel_id}.exr", custom=True
-    )
+    set_attribute(prim, "stereocell:atlas", _Types.Asset, f"./{_atlas_name(channel)}", custom=True)
     size = Gf.Vec3i(width, height, depth)
     set_attribute(prim, "stereocell:atlasSize", _Types.Int3, size, custom=True)
     set_attribute(prim, "stereocell:apron", _Types.Int, APRON, custom=True)
@@ -282,7 +298,7 @@ def _define_volume(
     return volume
 
 
-def _define_fields(volume: UsdVol.Volume, channel: ChannelContent) -> None:
+def _define_fields(volume: UsdVol.Volume, channel: ChannelContent, *, has_measured: bool) -> None:
     """Define a volume's fields as its children, all in one file: programs read one per volume.
 
     The field `measured` includes the apron. The bundle applies an edited window to it, and the
@@ -291,11 +307,11 @@ def _define_fields(volume: UsdVol.Volume, channel: ChannelContent) -> None:
     stage, path = volume.GetPrim().GetStage(), volume.GetPath()
     tokens = UsdVol.Tokens
     fields = [(GRID_NAME, tokens.fogVolume, tokens.half)]
-    if channel.measured is not None:
+    if has_measured:
         fields.append((MEASURED_NAME, tokens.unknown, tokens.float_))
     for name, kind, numbers in fields:
         field = UsdVol.OpenVDBAsset.Define(stage, path.AppendChild(name))
-        field.CreateFilePathAttr(f"./{channel.channel_id}.vdb")
+        field.CreateFilePathAttr(f"./{_fields_name(channel)}")
         field.CreateFieldNameAttr(name)
         field.CreateFieldClassAttr(kind)
         field.CreateFieldDataTypeAttr(numbers)
@@ -409,14 +425,14 @@ def _feed_steps(
     feed_vertices(mesh, look, kind, table[used], indices.reshape(-1).astype(np.int32))
 
 
-def _author_representations(root: Usd.Prim, tile: TileContent) -> None:
+def _author_representations(root: Usd.Prim, tile: TileContent, written: Sequence[Written]) -> None:
     variants = root.GetVariantSets().AddVariantSet("representation")
     for name in ("mesh", "volume", "both"):
         variants.AddVariant(name)
         variants.SetVariantSelection(name)
         with variants.GetVariantEditContext():
-            for channel in tile.channels:
-                if channel.volume is None or name == "both":
+            for channel, own in zip(tile.channels, written, strict=True):
+                if _atlas_name(channel) not in own.files or name == "both":
                     continue  # a channel without a volume shows its surface in every variant
                 if name == "mesh" or channel.lods:
                     suffix = "_volume" if name == "mesh" else ""
