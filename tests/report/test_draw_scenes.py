@@ -1,6 +1,7 @@
 """Pictures of meshes: where things are, what hides what, and how light falls."""
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,19 +10,26 @@ import pyvista as pv
 from numpy.typing import NDArray
 from PIL import Image
 
+from stereocell.model.mesh import Lod, Mesh
+from stereocell.model.unit import Unit
 from stereocell.report.draw_scenes import Scene, Surface, draw_scene
+from stereocell.steps.unit_files import save_unit
 
 FRAME = ((-10.0, -10.0, -10.0), (10.0, 10.0, 10.0))
 RED, BLUE = (1.0, 0.02, 0.02), (0.02, 0.02, 1.0)
 EYE = np.array([0.42, 0.5, 1.0]) / np.linalg.norm([0.42, 0.5, 1.0])
 
 
-def ball(folder: Path, name: str, center: NDArray[np.float64], radius: float) -> str:
+def ball(center: NDArray[np.float64], radius: float) -> Mesh:
     found = pv.Icosphere(radius, center, nsub=4)
-    triangles = found.regular_faces
     normals = (found.points - center) / radius
-    np.savez(folder / f"{name}.npz", positions=found.points, triangles=triangles, normals=normals)
-    return str(folder / f"{name}.npz")
+    return Mesh(np.asarray(found.points), found.regular_faces.astype(np.uint32), normals)
+
+
+def surface(folder: Path, mesh: Mesh, color: tuple[float, float, float]) -> Surface:
+    """Save a unit with one level of detail, and return its surface."""
+    save_unit(folder, Unit((Lod(mesh, 0.0),), None, None, "", 0, 0, {}))
+    return Surface(folder, 0, color)
 
 
 def picture_of(*surfaces: Surface, boxes: tuple[object, ...] = ()) -> NDArray[np.int64]:
@@ -32,7 +40,7 @@ def picture_of(*surfaces: Surface, boxes: tuple[object, ...] = ()) -> NDArray[np
 
 
 def test_a_ball_is_a_disc_in_the_middle_of_its_size(tmp_path: Path) -> None:
-    picture = picture_of(Surface(ball(tmp_path, "ball", np.zeros(3), 6.0), RED))
+    picture = picture_of(surface(tmp_path / "ball", ball(np.zeros(3), 6.0), RED))
     is_ball = picture[..., 0] > 60
     rows, columns = np.nonzero(is_ball)
     assert abs(rows.mean() - (picture.shape[0] - 1) / 2) < 1
@@ -46,7 +54,7 @@ def test_a_ball_is_a_disc_in_the_middle_of_its_size(tmp_path: Path) -> None:
 
 
 def test_light_comes_over_the_left_shoulder(tmp_path: Path) -> None:
-    picture = picture_of(Surface(ball(tmp_path, "ball", np.zeros(3), 6.0), RED))[..., 0]
+    picture = picture_of(surface(tmp_path / "ball", ball(np.zeros(3), 6.0), RED))[..., 0]
     middle = np.array(picture.shape) // 2
     at = 40
     upper_left, lower_right = picture[tuple(middle - at)], picture[tuple(middle + at)]
@@ -54,8 +62,8 @@ def test_light_comes_over_the_left_shoulder(tmp_path: Path) -> None:
 
 
 def test_the_nearer_surface_hides_the_farther_one_in_either_order(tmp_path: Path) -> None:
-    near = Surface(ball(tmp_path, "near", 4 * EYE, 3.0), RED)
-    far = Surface(ball(tmp_path, "far", -4 * EYE, 4.5), BLUE)
+    near = surface(tmp_path / "near", ball(4 * EYE, 3.0), RED)
+    far = surface(tmp_path / "far", ball(-4 * EYE, 4.5), BLUE)
     for order in ((near, far), (far, near)):
         picture = picture_of(*order)
         middle = picture[picture.shape[0] // 2, picture.shape[1] // 2]
@@ -65,13 +73,10 @@ def test_the_nearer_surface_hides_the_farther_one_in_either_order(tmp_path: Path
 
 
 def test_the_inside_of_an_open_shell_is_lit(tmp_path: Path) -> None:
-    file = ball(tmp_path, "ball", np.zeros(3), 6.0)
-    with np.load(file) as arrays:
-        parts = dict(arrays)
-    towards = parts["positions"][parts["triangles"]].mean(axis=1) @ EYE
-    parts["triangles"] = parts["triangles"][towards < 0]  # the half that faces away
-    np.savez(tmp_path / "shell.npz", **parts)
-    picture = picture_of(Surface(str(tmp_path / "shell.npz"), RED))
+    whole = ball(np.zeros(3), 6.0)
+    towards = whole.positions[whole.triangles].mean(axis=1) @ EYE
+    half = replace(whole, triangles=whole.triangles[towards < 0])  # the half that faces away
+    picture = picture_of(surface(tmp_path / "shell", half, RED))
     assert picture[picture.shape[0] // 2, picture.shape[1] // 2, 0] > 100
 
 
@@ -80,7 +85,7 @@ def test_boxes_are_hidden_behind_surfaces_and_drawn_before_them(tmp_path: Path) 
     around = picture_of(boxes=(box,))
     lines = np.abs(around - around[0, 0]).sum(axis=2) > 60
     assert 500 < lines.sum() < 8000
-    covered = picture_of(Surface(ball(tmp_path, "ball", np.zeros(3), 7.9), RED), boxes=(box,))
+    covered = picture_of(surface(tmp_path / "ball", ball(np.zeros(3), 7.9), RED), boxes=(box,))
     is_line = np.abs(covered - around).sum(axis=2) < 24
     assert 0.4 < (is_line & lines).sum() / lines.sum() < 0.8  # the ball hides the lines behind it
 

@@ -8,15 +8,21 @@ import numpy as np
 from PIL import Image
 
 from stereocell.preview.draw_slices import encode
-from stereocell.steps.unit_files import load_surface
+from stereocell.steps.unit_files import load_lod, lod_file, record_file
 from stereocell.textures.draw_meshes import Box, Shape, draw_pixels
 
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """A mesh file (.npz) that `save_unit` wrote, and its colour, linear RGB 0..1."""
+    """One level of detail of a unit.
 
-    file: str
+    unit   folder that `save_unit` wrote, absolute, because workers may run elsewhere
+    level  0 is the finest
+    color  linear RGB, 0..1
+    """
+
+    unit: Path
+    level: int
     color: tuple[float, float, float]
 
 
@@ -37,7 +43,11 @@ class Scene:
     @property
     def inputs(self) -> tuple[Path, ...]:
         """The files of the surfaces."""
-        return tuple(Path(surface.file) for surface in self.surfaces)
+        return tuple(
+            file
+            for one in self.surfaces
+            for file in (record_file(one.unit), lod_file(one.unit, one.level))
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,4 +74,5 @@ def draw_image(
 
 
 def _load(surface: Surface) -> Shape:
-    return Shape(*load_surface(Path(surface.file)), np.array(surface.color))
+    mesh = load_lod(surface.unit, surface.level).mesh
+    return Shape(mesh.positions, mesh.triangles, mesh.normals, np.array(surface.color))

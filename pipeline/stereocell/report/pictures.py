@@ -21,7 +21,6 @@ from stereocell.report.facts import Facts, UnitFacts
 from stereocell.report.objects import LabelFacts
 from stereocell.report.select_units import choose_level, choose_units, thin_out
 from stereocell.report.unit_pictures import DrawnUnit, Level, UnitPictures, draw
-from stereocell.steps.unit_files import lod_file
 
 MAX_PICTURED = 60  # largest number of units with pictures
 # Largest number of triangles in one picture, of a tile and of the whole specimen
@@ -172,13 +171,14 @@ def _scene(facts: Facts, tile: Tile | None, labels: Sequence[LabelFacts] = ()) -
     return Scene(
         surfaces=tuple(
             Surface(
-                str(lod_file(u.directory, min(level, len(u.lods) - 1)).absolute()),
+                u.directory.absolute(),
+                min(level, len(u.lods) - 1),
                 facts.survey[u.channel.id].appearance.color,
             )
             for u in (units[i] for i in thin_out(len(units), every))
         )
         + tuple(
-            Surface(str(lod_file(folder, len(one.levels) - 1).absolute()), one.color)
+            Surface(folder.absolute(), len(one.levels) - 1, one.color)
             for one in (labels if not facts.plan.channels else ())
             for folder in one.units
         ),

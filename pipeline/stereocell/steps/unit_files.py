@@ -181,18 +181,6 @@ def load_lod(directory: Path, level: int) -> Lod:
         raise OutputError(f"{directory}: damaged ({error}): {_remedy(directory)}") from error
 
 
-def load_surface(file: Path) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32]]:
-    """Return positions, triangles and normals from the file of one level of detail.
-
-    Raises OutputError for a damaged file.
-    """
-    try:
-        with file.open("rb") as opened, np.load(opened) as arrays:
-            return arrays["positions"], arrays["triangles"], arrays["normals"]
-    except (OSError, ValueError, LookupError, EOFError, BadZipFile) as error:
-        raise OutputError(f"{file}: damaged ({error}): {_remedy(file.parent)}") from error
-
-
 def load_quality(stored: Mapping[str, Any]) -> Quality:
     """Return the quality of one level of detail from its entry in a record."""
     ways = {way: Spread(**stored[way]) for way in ("away", "back")}
