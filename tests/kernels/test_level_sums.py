@@ -11,6 +11,7 @@ from stereocell.isosurface.level_evidence import (
     noise_edges,
 )
 from stereocell.isosurface.level_histogram import BINS, Scale
+from stereocell.kernels.value_counts import count_values
 
 OWN = (slice(1, 20), slice(1, 23), slice(4, 36))
 SPACING = (0.5, 0.2, 0.2)
@@ -45,3 +46,27 @@ def test_sums_and_differences_equal_those_of_numpy() -> None:
     counts, _ = np.histogram(np.clip(size, 0, edges[-1]), edges)
     assert len(counts) == NOISE_BINS
     np.testing.assert_array_equal(found.differences, counts)
+
+
+def test_values_that_are_no_numbers_are_counted_in_the_first_bin() -> None:
+    """Sources are read without such values, but a script may pass an array that has them."""
+    field = np.full((6, 8, 30), 50.0, np.float32)
+    field[2, 3, 7], field[3, 4, 9], field[4, 5, 11] = np.nan, np.inf, -np.inf
+    scale, own = Scale(0.0, 100.0, 50.0), (slice(1, 5), slice(1, 7), slice(4, 26))
+    found = gather_evidence(
+        field,
+        np.zeros(field.shape, bool),
+        own,
+        voxels=np.nan_to_num(field, posinf=0, neginf=0),
+        spacing_um=SPACING,
+        counting=Counting(scale, None, None),
+    )
+    counts = found.plain.counts
+    assert (counts.sum(), counts[0], counts[-1]) == (field[own].size, 2, 1)
+    assert found.differences.sum() == field[own].size
+
+
+def test_a_histogram_without_width_has_all_values_in_one_bin() -> None:
+    counts = np.zeros(4, np.int64)
+    count_values(np.array([0.0, np.nan, 1.0]), np.zeros(5), 0.0, 0.0, False, counts)
+    assert counts.sum() == 1

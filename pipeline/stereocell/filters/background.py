@@ -100,7 +100,7 @@ class _Sample:
     """Every k-th voxel along each axis, from which the background found so far was subtracted.
 
     values  float32 (z, y, x), voxel values
-    kept    bool, the same shape: voxels that are not padding; None: no voxel is
+    kept    bool, the same shape: voxels that are not padding; None: there is no padding
     start   index of the first voxel along each axis
     every   k
     """

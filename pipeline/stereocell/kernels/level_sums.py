@@ -48,7 +48,9 @@ def sum_by_value(
             square_slopes(before, field[z], behind, y, factors, ends, squares)
             row, is_out = field[z, y], padding[z, y]
             for x in range(width):
-                places[x] = np.int32(min(max((row[x] - low) / step, np.float32(0)), most))
+                place = (row[x] - low) / step
+                # NaN becomes 0, too: the indices below are not checked
+                places[x] = np.int32(min(place if place > 0 else np.float32(0), most))
             for x in range(width):
                 slopes[x] = np.sqrt(squares[x])
             for x in range(own[2, 0], own[2, 1]):

@@ -30,7 +30,8 @@ def count_values(
             value = min(max(value, low), high)
         if not low <= value <= high:
             continue
-        at = min(int((value - edges[0]) * scale), bins - 1)
+        place = (value - edges[0]) * scale
+        at = int(place) if place < bins else bins - 1  # NaN, too, where the bins have no width
         # Rounding may have moved a value that lies near an edge.
         if value < edges[at]:
             at -= 1
