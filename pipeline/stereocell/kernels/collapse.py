@@ -50,6 +50,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import in_place, step
+from stereocell.kernels.edge_records import RECORD
 from stereocell.kernels.half_edges import Ints
 from stereocell.kernels.interface_rings import CORNER, ON_LINE, fill_sheets
 from stereocell.kernels.mesh_rings import (
@@ -127,13 +128,14 @@ def collapse(
     limits = Limits(stray, sharpest, BLOCK)
     if n <= BLOCK:
         mesh = make_mesh(n, m, planes=planes, caps=caps, errors=errors)
+        mesh.at[:, :3] = at
         fill_fans(mesh, triangles, locked)
-        return _run(mesh, at, triangles, past, limits)
+        corners, left, made = _run(mesh, past, limits)
+        return np.ascontiguousarray(corners), left, made
     order = order_vertices(at)
     place = np.empty(n, np.int32)
     place[order] = np.arange(n, dtype=np.int32)
     turns = order_triangles(triangles, place)
-    ordered = rename(place, triangles, turns)
     mesh = make_mesh(
         n,
         m,
@@ -141,8 +143,10 @@ def collapse(
         caps=None if caps is None else caps[order],
         errors=errors[order],
     )
-    fill_fans(mesh, ordered, locked[order])
-    corners, left, made = _run(mesh, at[order], ordered, place[past], limits)
+    for axis in range(3):
+        mesh.at[:, axis] = at[order, axis]
+    fill_fans(mesh, rename(place, triangles, turns), locked[order])
+    corners, left, made = _run(mesh, place[past], limits)
     result, is_left = rename_back(order, corners, turns, left)
     return result, is_left, order[made]
 
@@ -163,15 +167,19 @@ def collapse_interfaces(
     orders  int8 (n,), see `find_orders`; corners stay, and vertices of lines stay on their lines
     """
     mesh = make_mesh(len(at), len(triangles), on_line=orders == ON_LINE, errors=errors)
+    mesh.at[:, :3] = at
     mesh.stays[:] = locked | (orders == CORNER)
-    return _run(mesh, at, triangles, past, Limits(stray, sharpest, len(at)))
+    fill_sheets(mesh, triangles)
+    corners, left, made = _run(mesh, past, Limits(stray, sharpest, len(at)))
+    return np.ascontiguousarray(corners), left, made
 
 
-def _run(
-    mesh: Mesh, at: Points, triangles: Ints, past: Ints, limits: Limits
-) -> tuple[Ints, Flags, Ints]:
-    """Return the result of `collapse` for a surface, or for interfaces."""
-    n, is_a_surface = len(at), len(mesh.on_line) == 0
+def _run(mesh: Mesh, past: Ints, limits: Limits) -> tuple[Ints, Flags, Ints]:
+    """Return the result of `collapse` for a surface or interfaces whose edges are written.
+
+    The triangles are a view of the mesh's edges.
+    """
+    n, is_a_surface = len(mesh.at), len(mesh.on_line) == 0
     work = Work(
         ring=make_ring(n, is_surface=is_a_surface),
         other=make_ring(0 if is_a_surface else n, is_surface=is_a_surface),
@@ -181,19 +189,15 @@ def _run(
         differs=np.full(n, len(past) == 0),
         made=np.empty((n, 2), np.int32),
     )
-    mesh.at[:, :3] = at
-    count = collapse_in_place(mesh, triangles, past, work, limits)
-    corners = np.ascontiguousarray(mesh.edges.reshape(-1, 8)[:, :3])
-    return corners, mesh.is_left, work.made[:count]
+    count = collapse_in_place(mesh, past, work, limits)
+    return mesh.edges.reshape(-1, RECORD)[:, :3], mesh.is_left, work.made[:count]
 
 
 @in_place
-def collapse_in_place(mesh: Mesh, triangles: Ints, past: Ints, work: Work, limits: Limits) -> int:
+def collapse_in_place(mesh: Mesh, past: Ints, work: Work, limits: Limits) -> int:
     """Collapse a mesh as far as its errors allow; return the number of collapses."""
-    if not is_surface(mesh):
-        fill_sheets(mesh, triangles)
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    for h in range(0, len(mesh.edges), RECORD):
+        a, b, c = mesh.edges[h], mesh.edges[h + 1], mesh.edges[h + 2]
         add_plane(mesh.at, a, b, c, mesh.errors, mesh.quadrics)
     made = replay(mesh, past, work)
     find_costs(mesh, work)

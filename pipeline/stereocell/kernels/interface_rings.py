@@ -71,10 +71,11 @@ def _find_order(ring: Ring) -> int:
     return ON_LINE if ends else WITHIN
 
 
-@step
+@in_place
 def fill_sheets(mesh: Mesh, triangles: Ints) -> None:
     """Write the half-edges of interfaces into the mesh."""
-    mesh.start[:] = -1
+    for v in range(len(mesh.start)):
+        mesh.start[v] = -1
     for t in range(len(triangles) - 1, -1, -1):
         for k in range(2, -1, -1):
             v, h = triangles[t, k], RECORD * t + k

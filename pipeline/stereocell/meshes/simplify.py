@@ -92,15 +92,16 @@ def simplify_part(
     if not len(used):
         return triangles, np.zeros(0, bool), NOTHING
     positions = mesh.positions.take(used, axis=0)
-    at = positions.astype(np.float64)
-    at -= (at.min(axis=0) + at.max(axis=0)) / 2
     bits, of_caps = (find_planes(positions, some) for some in (planes, caps))
+    at = positions.astype(np.float64)
+    del positions
+    at -= (at.min(axis=0) + at.max(axis=0)) / 2
     sharpest, sharp = np.cos(np.radians([SHARPEST_DEG, FLIP_DEG])).tolist()
     number = np.zeros(len(mesh.positions), np.int32)
     number[used] = np.arange(len(used), dtype=np.int32)
     corners, left, moves = collapse(
         at,
-        own.astype(np.int32),
+        own.view(np.int32),
         locked[used],
         bits,
         errors[used],

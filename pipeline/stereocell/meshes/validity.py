@@ -97,13 +97,16 @@ class Topology:
 
 def find_topology(triangles: NDArray[np.integer], vertices: int) -> Topology:
     """Return how triangles (m, 3) are connected. vertices: their number."""
-    corners = np.ascontiguousarray(triangles, np.int32)
+    # The indices of a large mesh take much memory, and a view of them none.
+    is_view = triangles.dtype == np.uint32
+    corners = triangles.view(np.int32) if is_view else triangles.astype(np.int32)
+    corners = np.ascontiguousarray(corners)
     twins = match_twins(corners, vertices)
     return Topology(
         corners,
         twins,
-        _ends_of(corners.astype(np.int64), np.flatnonzero(twins == BORDER)),
-        _ends_of(corners.astype(np.int64), np.flatnonzero(twins == CROWDED)),
+        _ends_of(corners, np.flatnonzero(twins == BORDER)),
+        _ends_of(corners, np.flatnonzero(twins == CROWDED)),
         np.flatnonzero(count_fans(corners, twins, vertices)[1] < 0),
         label_vertices(corners, vertices),
     )
@@ -170,14 +173,15 @@ def border(triangles: NDArray[np.integer]) -> Indices:
     """
     corners = np.ascontiguousarray(triangles, np.int32)
     twins = match_twins(corners, int(corners.max(initial=-1)) + 1)
-    lone = _ends_of(corners.astype(np.int64), np.flatnonzero(twins < 0))
+    lone = _ends_of(corners, np.flatnonzero(twins < 0))
     return lone[np.lexsort(lone.T[::-1])]
 
 
-def _ends_of(triangles: Indices, half_edges: NDArray[np.integer]) -> Indices:
+def _ends_of(triangles: NDArray[np.int32], half_edges: NDArray[np.integer]) -> Indices:
     """Return the two vertices of half-edges, int64 (n, 2)."""
     triangle, corner = np.divmod(half_edges, 3)
-    return np.stack([triangles[triangle, corner], triangles[triangle, (corner + 1) % 3]], axis=1)
+    ends = triangles[triangle, corner], triangles[triangle, (corner + 1) % 3]
+    return np.stack(ends, axis=1).astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True)

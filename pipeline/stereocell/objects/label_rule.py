@@ -27,6 +27,8 @@ MIN_OBJECTS = 8  # number of values from which whole objects are sufficient evid
 # Least share of the unequal pairs that differ by 1, in a smooth image of over MANY_LEVELS values
 ONE_OFF = 0.5
 MANY_LEVELS = 32
+# Values below this are counted in a table, which takes a quarter of the time of sorting them
+_SMALL_VALUES = 1 << 20
 _NO_LABELS = 0.5  # share of equal pairs below which components are not examined
 
 
@@ -55,15 +57,19 @@ def recognise(voxels: NDArray[Any]) -> LabelEvidence:
     """
     if voxels.dtype.kind not in "iu" or not voxels.size or voxels.min() < 0:
         return LabelEvidence("image", 0)
-    found, places, counts = np.unique(voxels, return_inverse=True, return_counts=True)
-    values = len(found) - int(found[0] == 0)
-    if len(found) <= 2:
-        return LabelEvidence("mask" if len(found) == 2 else "image", values)
     # Values become small indices, with 0 for the ground.
-    compact = 1 + places.reshape(voxels.shape).astype(np.uint32)
-    compact[voxels == 0] = 0
+    if voxels.max() < _SMALL_VALUES:
+        compact = voxels.astype(np.uint32)
+    else:
+        found, places = np.unique(voxels, return_inverse=True)
+        compact = places.reshape(voxels.shape).astype(np.uint32) + np.uint32(found[0] != 0)
+    counts = np.bincount(compact.reshape(-1))
+    values = int(np.count_nonzero(counts[1:]))
+    different = values + int(counts[0] > 0)
+    if different <= 2:
+        return LabelEvidence("mask" if different == 2 else "image", values)
     if values > MIN_OBJECTS:  # with few values, the most common one may be a class
-        compact[voxels == found[counts.argmax()]] = 0
+        compact[compact == counts.argmax()] = 0
     pairs, equal, one_off = np.zeros(3), np.zeros(3), 0
     for axis in range(3):
         ahead, behind = (np.moveaxis(compact, axis, 0)[part] for part in (_FIRST, _LAST))

@@ -3,6 +3,7 @@
 No file is read or written here.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -95,15 +96,19 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
     If the field never crosses the iso-value, the unit has no surface and states the reason.
     """
     clock = Clock()
-    with clock("volume"):
+    unit = _build_surface(volume, given, painted, clock)
+    with clock("volume"):  # last, because levels of detail take the most memory
         kept = cut_voxels(volume.voxels, given.lattice, given.holder)
         eight_bit = to_eight_bits(kept, given.intensity_window)
         measured = find_measured(kept, given)
     window = given.intensity_window
-    if given.iso is None:
-        reason = "the channel has no iso-value"
-        return Unit((), None, eight_bit, reason, 0, 0, clock.seconds, measured, window=window)
+    return replace(unit, volume=eight_bit, measured=measured, window=window, seconds=clock.seconds)
 
+
+def _build_surface(volume: Volume, given: UnitInput, painted: Volume | None, clock: Clock) -> Unit:
+    """Return a unit with its surface, and without its volume."""
+    if given.iso is None:
+        return Unit((), None, None, "the channel has no iso-value", 0, 0, {})
     lattice = given.lattice.thinned(given.step)
     repaired, by_triangles = _repaired(volume, given, lattice, given.iso, clock)
     fine = _extract(repaired, by_triangles, given, lattice, clock)
@@ -112,8 +117,7 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
         cover = find_cover(volume, given, repaired)
     if not len(fine.triangles):
         reason = "no voxel crosses the iso-value"
-        numbers = dropped, filled, clock.seconds
-        return Unit((), None, eight_bit, reason, *numbers, measured, None, cover, window)
+        return Unit((), None, None, reason, dropped, filled, {}, cover=cover)
     closed = None
     if given.options.closed_tiles:
         with clock("close"):
@@ -131,8 +135,7 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
         caps=lattice.cap_planes(),
         get_texturer=shading.texturer,
     )
-    numbers = dropped, filled, clock.seconds
-    return Unit(lods, closed, eight_bit, "", *numbers, measured, None, cover, window)
+    return Unit(lods, closed, None, "", dropped, filled, {}, cover=cover)
 
 
 def find_surface(volume: Volume, given: UnitInput) -> tuple[Mesh, Cover | None]:
@@ -208,8 +211,8 @@ def _extract(
 class _Shading:
     """Ambient occlusion and painted channel, at vertices and in maps of all levels of detail.
 
-    The distance field is kept only if there are maps. Otherwise the solid is enough, which takes a
-    quarter of its memory.
+    The distance field is kept only if there are maps. Otherwise the solid is enough. It is kept as
+    a bit a voxel, because levels of detail are made before it is needed.
     """
 
     def __init__(
@@ -223,7 +226,8 @@ class _Shading:
         self._given, self._lattice, self._painted, self._clock = given, lattice, painted, clock
         self._options = given.options.unwrap.resolved(given.lattice.spacing_um)
         # slightly smaller than the surface, so that rays from the surface start outside
-        self._solid = distance > 0.25 * max(lattice.spacing_um)
+        self._solid = np.packbits(distance > 0.25 * max(lattice.spacing_um))
+        self._shape = distance.shape
         self._distance = distance if self._options.maps else None
 
     def texturer(self, mesh: Mesh, number: NDArray[np.int64]) -> Texturer:
@@ -241,8 +245,9 @@ class _Shading:
 
     def _openness(self, mesh: Mesh, thinned: bool = False) -> NDArray[np.float32]:
         radius_um = float(self._options.occlusion_um)
+        solid = np.unpackbits(self._solid, count=math.prod(self._shape)).view(bool)
         return find_ambient_visibility(
-            self._solid, self._lattice, mesh, radius_um=radius_um, thinned=thinned
+            solid.reshape(self._shape), self._lattice, mesh, radius_um=radius_um, thinned=thinned
         )
 
     def _paint(self, mesh: Mesh) -> NDArray[np.float32] | None:

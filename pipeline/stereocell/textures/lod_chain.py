@@ -81,9 +81,8 @@ def make_levels(
         topology: Topology | None = find_topology(fine.triangles, len(fine.positions))
         volumes = FineVolumes(fine, planes, box, topology, caps)
         bodies = SmallBodies(fine, topology)
-    with clock("measure"):
-        of_all = Nearest(fine, lod.samples)
-    to_fine: Nearest | None = of_all  # without bodies that are removed; None: not made yet
+    of_all: Nearest | None = None  # made after the first simplification, which takes most memory
+    to_fine: Nearest | None = None  # without bodies that are removed; None: not made yet
     # The vertex of `mesh` that stands for each fine vertex; -1: none does
     owners = np.arange(len(fine.positions), dtype=np.int32)
     gone = np.zeros(len(fine.positions), bool)
@@ -108,7 +107,8 @@ def make_levels(
         number, shown = number[simplified.vertices], kept.mesh
         owners = _follow(owners, simplified.owners)
         with clock("measure"):
-            to_fine = to_fine or of_all.without(gone)
+            of_all = of_all or Nearest(fine, lod.samples)
+            to_fine = to_fine or (of_all.without(gone) if gone.any() else of_all)
             to_mesh = Nearest(shown, lod.samples, simplified.topology.twins)
             away, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
             # A coarser level never states a smaller distance, because viewers rely on the order,
