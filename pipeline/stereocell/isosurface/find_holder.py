@@ -74,9 +74,13 @@ def find_holder(voxels: NDArray[Any], spacing_um: Spacing, region: Box) -> Holde
     (box,) = ndimage.find_objects(solid.astype(np.uint8))
     side = min((s.stop - s.start) * step for s, step in zip(box, spacing, strict=True))
     depth = min(_DEPTH_UM, _DEPTH_SHARE * side)
-    body = _body(voxels, solid, spacing, depth)
-    if body is None:
+    # The air around the solid changes nothing, beyond one layer of it.
+    near = tuple(slice(max(s.start - 1, 0), s.stop + 1) for s in box)
+    found_near = _body(voxels[near], np.ascontiguousarray(solid[near]), spacing, depth)
+    if found_near is None:
         return None
+    body = np.zeros(voxels.shape, bool)
+    body[near] = found_near
     found, pieces = _pieces_outside(voxels, solid, body, spacing, depth)
     if not pieces:
         return None
