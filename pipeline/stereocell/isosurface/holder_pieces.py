@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from stereocell.filters.boxes import dilate
+
 BONE_HU = 500.0
 _BONE_SHARE = 0.1  # largest share of a soft holder's voxels above BONE_HU; five holders had .02
 # HU from which a voxel is metal, as in a cardiogram's cables and electrodes (3000). In the body
@@ -127,7 +129,7 @@ def add_attached(
         values = voxels[place][labels[place] == number]
         has_flesh = float(np.percentile(values, 95)) > _NO_FLESH_HU
         stays[number] = has_flesh and counts[number] > _CRUMB * depth_voxels
-    blocked = ndimage.binary_dilation(body, np.ones((3, 3, 3), bool)) | stays[labels]
+    blocked = dilate(body, (1, 1, 1)) | stays[labels]
     faint = cc3d.connected_components(found | ((voxels > _FOAM_HU) & ~blocked), connectivity=26)
     is_attached = np.zeros(int(faint.max()) + 1, bool)
     is_attached[np.unique(faint[found])] = True

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from stereocell.filters.boxes import dilate, erode
 from stereocell.filters.denoise import SMOOTHING_REACH, median_reach
 from stereocell.isosurface.axis_profiles import Profiles
 from stereocell.isosurface.distance_field import gradient_magnitude
@@ -147,13 +147,13 @@ def find_padding(
     # At the end of a row a run of half the size is enough
     if not any(_has_run(plane, (size[2] + 1) // 2) for plane in dark):
         return np.zeros(voxels.shape, bool)
-    flat = ndimage.minimum_filter(dark.view(np.uint8), size, mode="nearest")
+    before = tuple(n // 2 for n in size)
+    flat = erode(dark, before, tuple(n - 1 - k for n, k in zip(size, before, strict=True)))
     if not flat.any():
-        return flat.view(bool)
+        return flat
     # Grow back to the run's own ends, and further to where denoising mixes it with its
     # surroundings.
-    wide = tuple(4 * r + 1 if axis else 2 * r + 1 for axis, r in enumerate(reach))
-    return ndimage.maximum_filter(flat, wide, mode="nearest").view(bool)
+    return dilate(flat, (reach[0], 2 * reach[1], 2 * reach[2]))
 
 
 def _has_run(flags: NDArray[np.bool_], length: int) -> bool:

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from stereocell.filters.boxes import dilate
 from stereocell.isosurface.components import find_components
 from stereocell.kernels.closing import close_gaps
 from stereocell.model.spacing import Spacing
@@ -103,10 +103,7 @@ def _drop_fragments(distance: Distance, spacing_um: Spacing, options: RepairOpti
     gone = components.mask_of(small)
     if options.offset_um > 0:
         # Just outside a fragment the distance is barely negative, and the offset would restore it.
-        near = ndimage.maximum_filter(gone.view(np.uint8), 3, mode="constant")
-        kept = components.mask_of(~small).view(np.uint8)
-        near &= ~ndimage.maximum_filter(kept, 3, mode="constant") & 1
-        gone |= near.view(bool)
+        gone |= dilate(gone, (1, 1, 1)) & ~dilate(components.mask_of(~small), (1, 1, 1))
     np.copyto(distance, np.float32(-2 * max(spacing_um)), where=gone)
     return int(small.sum())
 

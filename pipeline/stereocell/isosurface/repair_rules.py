@@ -22,8 +22,8 @@ from typing import Any
 import cc3d
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from stereocell.filters.boxes import dilate
 from stereocell.isosurface.components import Components, find_components
 from stereocell.isosurface.options import SurfaceOptions
 from stereocell.isosurface.repair import RepairOptions
@@ -129,7 +129,7 @@ def _added(
     touches = np.zeros(count + 1, bool)
     touches[labels[before & main]] = True
     is_connected = touches[labels]
-    around = ndimage.binary_dilation(before, np.ones((3, 3, 3), bool), REACH)
+    around = dilate(before, (REACH, REACH, REACH))
     return int((is_connected & ~around).sum()), int((main & ~is_connected).sum())
 
 

@@ -10,8 +10,8 @@ bones of a head's CT scan 2 %.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from stereocell.filters.boxes import dilate, erode
 from stereocell.model.lattice import Step
 
 
@@ -24,14 +24,11 @@ def count_thin(solid: NDArray[np.bool_], step: Step) -> int:
     """
     if step == (1, 1, 1) or not solid.any():
         return 0
-    past = [(every, every) if every > 1 else (0, 0) for every in step]
-    opened = np.pad(solid.view(np.uint8), past, mode="edge")
-    sizes = [(axis, every + 1) for axis, every in enumerate(step) if every > 1]
-    for axis, size in sizes:
-        opened = ndimage.minimum_filter1d(opened, size, axis, mode="nearest")
-    for axis, size in sizes:
-        # A window of even size is longer on one side, so the second pass has to be mirrored.
-        origin = 0 if size % 2 else -1
-        opened = ndimage.maximum_filter1d(opened, size, axis, mode="nearest", origin=origin)
-    z, y, x = (slice(low, low + n) for (low, _), n in zip(past, solid.shape, strict=True))
-    return int(np.count_nonzero(solid & (opened[z, y, x] == 0)))
+    past = tuple(every if every > 1 else 0 for every in step)
+    padded = np.pad(solid, [(n, n) for n in past], mode="edge")
+    before = tuple((n + 1) // 2 for n in past)
+    after = tuple(n - k for n, k in zip(past, before, strict=True))
+    # A box of even size is longer on one side, so the second pass is mirrored.
+    opened = dilate(erode(padded, before, after), after, before)
+    z, y, x = (slice(low, low + n) for low, n in zip(past, solid.shape, strict=True))
+    return int(np.count_nonzero(solid & ~opened[z, y, x]))
