@@ -51,6 +51,7 @@ from stereocell.usd.read_levels import (
 )
 from stereocell.usd.read_mesh import move_mesh
 from stereocell.usd.read_textures import ComposedMaps, read_image
+from stereocell.usd.read_variants import lod_levels
 from stereocell.usd.typed_values import read_as
 
 T = TypeVar("T")
@@ -91,7 +92,9 @@ def shown_lods(tile: Usd.Prim, channel_id: str, finest: int = 0) -> Shown:
     Raises StageError if a mesh can't be drawn, or has a point that is not finite.
     """
     lods = list(read_lods(tile, channel_id))
-    emptied = find_emptied(tile, channel_id)
+    # A level without faces is not read, and selecting each level again would take as long.
+    is_one_missing = len(lods) < len(lod_levels(tile) or [0])
+    emptied = find_emptied(tile, channel_id) if is_one_missing else []
     if emptied and (not lods or emptied[0] < lods[0].level):
         return Shown((), f"edited by hand: lod{emptied[0]} is empty, so no surface is left")
     edited = _edited_levels(lods)

@@ -108,6 +108,8 @@ def shortest(number: float) -> float:
 
 def select_variant(prim: Usd.Prim, variant_set: str, variant: str) -> None:
     """Select a variant in the session layer, which is never saved."""
+    if prim.GetVariantSet(variant_set).GetVariantSelection() == variant:
+        return  # to select it again would compose the prim again
     stage = prim.GetStage()
     with Usd.EditContext(stage, stage.GetSessionLayer()):
         prim.GetVariantSet(variant_set).SetVariantSelection(variant)

@@ -3,7 +3,7 @@
 The levels are variants. The reader selects them one after the other in the session layer.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,14 +84,19 @@ class ComposedLod:
     images: MadeMaps | None = None
 
 
-def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
+def read_lods(
+    tile: Usd.Prim, channel_id: str, *, wanted: Sequence[int] | None = None
+) -> Iterator[ComposedLod]:
     """Yield a channel's surface in a loaded tile at each level of detail, finest first.
+
+    wanted  levels to read, in this order; None: all levels
 
     Yields nothing if the tile has no surface. Raises StageError for a mesh that can't be drawn, for
     example without a material.
     """
     levels = lod_levels(tile)
-    for level in levels or [0]:  # a flattened stage has one level, and no variants
+    # a flattened stage has one level, and no variants
+    for level in (levels or [0]) if wanted is None else wanted:
         prim = mesh_at(tile, channel_id, level)
         if prim is None:
             continue

@@ -166,9 +166,10 @@ def _read_parts(
     for name in [str(prim.GetName()) for prim in prims]:
         with loaded(stage, name) as (tile, _):
             for channel in channels:
-                lods = [lod for lod in read_lods(tile, channel) if lod.level <= level]
-                if lods and len(lods[-1].mesh.triangles):
-                    yield _Part(name, channel, lods[-1])
+                wanted = [one for one in reversed(lod_levels(tile) or [0]) if one <= level]
+                lod = next(read_lods(tile, channel, wanted=wanted), None)
+                if lod is not None and len(lod.mesh.triangles):
+                    yield _Part(name, channel, lod)
 
 
 def _new_stage(name: str, longest_um: float, size_m: float, level: int) -> Usd.Stage:
