@@ -13,6 +13,7 @@ from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse, collapse_interfaces
 from stereocell.kernels.critical import find_critical
 from stereocell.kernels.crossings import find_candidates, find_maybe_flat, find_spread
+from stereocell.kernels.deflate import MAX_BYTES, make_space
 from stereocell.kernels.depth_buffer import find_visible
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
@@ -73,7 +74,7 @@ from stereocell.kernels.triangle_rows import (
 )
 from stereocell.kernels.union_find import label_pairs
 from stereocell.kernels.value_counts import count_values
-from stereocell.kernels.vdb_leaves import VOXELS, cut_leaves
+from stereocell.kernels.vdb_leaves import HEAD, VOXELS, cut_leaves, pack_halves
 from stereocell.kernels.visibility import cast_rays
 from stereocell.kernels.xxhash import xxh32
 
@@ -194,3 +195,5 @@ def compile_others() -> None:
     halves, floats = np.zeros(VOXELS, np.uint16), np.zeros(VOXELS, np.float32)
     cut_leaves(fixed["u1"], corner, np.zeros(256, np.uint16), np.uint16(0), bits, halves)
     cut_leaves(fixed["u2"], corner, None, np.float32(0), bits, floats)
+    ends, packed = np.array([VOXELS]), np.zeros(HEAD + MAX_BYTES, np.uint8)
+    pack_halves(bits, ends, halves, make_space(), packed, ends.copy())

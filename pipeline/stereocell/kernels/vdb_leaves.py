@@ -1,14 +1,17 @@
-"""Cut a volume into the leaves of an OpenVDB tree: blocks of 8^3 voxels."""
+"""Cut a volume into the leaves of an OpenVDB tree, blocks of 8^3 voxels, and pack them."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.compiled import kernel
+from stereocell.kernels.compiled import in_place, kernel
+from stereocell.kernels.deflate import Space, write_stream
 
 LEAF = 8  # voxels along an edge of a leaf
 VOXELS = LEAF**3
+ONLY_ACTIVE_VALUES = 0  # code: inactive voxels have the value of the background
+HEAD = VOXELS // 8 + 1 + 8  # bytes before the values of a leaf: mask, code, size
 
 
 @kernel
@@ -63,3 +66,41 @@ def cut_leaves(
         counts[leaf] = count
         end += count
     return counts
+
+
+@in_place
+def pack_halves(
+    masks: NDArray[np.uint8],
+    ends: NDArray[np.int64],
+    halves: NDArray[np.uint16],
+    space: Space,
+    out: NDArray[np.uint8],
+    ends_in_out: NDArray[np.int64],
+) -> None:
+    """Write the buffers of leaves of half floats: mask, code, size, and compressed active values.
+
+    masks        (n, 64), see `cut_leaves`
+    ends         (n,), number of active values up to the end of each leaf
+    halves       active values of all leaves
+    space        of `make_space`
+    out          long enough for all values, HEAD bytes for each leaf, and MAX_BYTES
+    ends_in_out  (n,), filled with the ends of the buffers
+
+    Values that become no shorter are stored as they are, with a negative size.
+    """
+    at, start = 0, 0
+    for leaf in range(len(ends)):
+        end, values = ends[leaf], at + HEAD
+        size = write_stream(halves, start, end, space, out, values) - values
+        if size >= 2 * (end - start):
+            size = 2 * (start - end)
+            for k in range(start, end):
+                out[values + 2 * (k - start)] = halves[k] & 255
+                out[values + 2 * (k - start) + 1] = halves[k] >> 8
+        for k in range(VOXELS // 8):
+            out[at + k] = masks[leaf, k]
+        out[values - 9] = ONLY_ACTIVE_VALUES
+        for k in range(8):
+            out[values - 8 + k] = size >> 8 * k & 255
+        at, start = values + abs(size), end
+        ends_in_out[leaf] = at

@@ -6,7 +6,7 @@ reference does so, too. Distances are measured from each level to the reference 
 them are compared with the unit's record: the 99th percentile over both areas, by the same measure
 as a level's stated distance, and the largest one, vertices included. Surfaces must face the same
 way. Normals, occlusion, maps and UVs must equal the unit's. Every voxel of a volume is compared in
-8 bits, and the content of the stage's .vdb after decompression.
+8 bits, and the content of the stage's .vdb (formats/vdb.py).
 """
 
 from collections.abc import Iterator
