@@ -61,6 +61,7 @@ from stereocell.kernels.placement import (
 )
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
+from stereocell.kernels.shading import light_pixels
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.solid_counts import count_inside
@@ -164,7 +165,9 @@ def compile_others() -> None:
     mesh_of = np.zeros((1, 1), np.int32)
     corners, heights = np.ascontiguousarray(at[:, :2]), np.ones(4)
     drawn = triangles.astype(np.uint32)
-    find_visible(corners, heights, drawn, 0, near, mesh_of, which, np.ones((1, 1, 3)))
+    find_visible(corners, heights, drawn, 0, near, mesh_of, which, picture := np.ones((1, 1, 3)))
+    visible, lamps = (mesh_of, which, picture, drawn, corners), np.ones((1, 7))
+    light_pixels(0, *visible, at.astype(np.float32), at, at[:3], lamps, 0.1, 0.1, 0.1, picture)
     one = np.ones(1, np.float32)
     cast_rays(voxels > 0, points, points, points, points, one, one)
 

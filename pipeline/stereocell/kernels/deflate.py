@@ -180,7 +180,7 @@ def _replace_last(numbers: NDArray[np.uint16], at: int, last: NDArray[np.int64])
 
 @step
 def _add_up(numbers: NDArray[np.uint16], start: int, end: int) -> tuple[Any, Any]:
-    """Return the two sums of Adler-32. Those of a block are small, so one division is enough."""
+    """Return the two sums of Adler-32. The sums of a block are small, so one division is enough."""
     low, high, after = np.int64(1), np.int64(2 * (end - start)), np.int64(2 * (end - start))
     for i in range(start, end):
         first, second = np.int64(numbers[i]) & 255, np.int64(numbers[i]) >> 8
