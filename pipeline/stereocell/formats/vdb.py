@@ -49,7 +49,7 @@ from stereocell.kernels.vdb_leaves import HEAD, pack_halves
 from stereocell.model.errors import StageError
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.volume import zyx_to_xyz
-from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.atomic_write import replacing
 
 GRID_NAME = "density"
 MEASURED_NAME = "measured"
@@ -97,17 +97,16 @@ def write_vdb(
     ('density', [0.5, 0.5, 2.0], [0.0, -2.5, 0.0])
     """
     grids, transform = _grids(density, first_um, spacing_um, measured, apron)
-    parts, at = list[bytes | memoryview]([bytes(_HEADER_BYTES)]), _HEADER_BYTES
+    parts, at = list[bytes | memoryview](), _HEADER_BYTES
     for grid in grids:
         leaves = find_leaves(grid)
         descriptor, head = describe(grid, leaves, transform)
         buffers = _buffers(grid, leaves)
-        end = at + len(descriptor) + _OFFSETS.size + len(head) + sum(map(len, buffers))
-        parts += [_placed(descriptor, head, at, end), *buffers]
+        end = at + len(descriptor) + _OFFSETS.size + len(head) + len(buffers)
+        parts += [_placed(descriptor, head, at, end), buffers]
         at = end
-    content = bytearray().join(parts)
-    content[:_HEADER_BYTES] = _header(memoryview(content)[_HEADER_BYTES:], len(grids))
-    write_bytes(path, content)
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        file.writelines([_header(parts, len(grids)), *parts])
 
 
 def is_vdb_of(
@@ -139,7 +138,7 @@ def is_vdb_of(
             at = end
     except (struct.error, RuntimeError, ValueError):  # a buffer is too short or damaged
         return False
-    header = _header(content[_HEADER_BYTES:], len(grids))
+    header = _header([content[_HEADER_BYTES:]], len(grids))
     return at == len(content) and bytes(content[:_HEADER_BYTES]) == header
 
 
@@ -161,9 +160,12 @@ def _grids(
     return grids, transform
 
 
-def _header(body: memoryview, grids: int) -> bytes:
+def _header(body: list[bytes | memoryview], grids: int) -> bytes:
     """Return the header of a file with a number of grids. Its UUID is a hash of the body."""
-    digest = hashlib.sha256(body).hexdigest().upper()
+    hashed = hashlib.sha256()
+    for part in body:
+        hashed.update(part)
+    digest = hashed.hexdigest().upper()
     cuts = (0, 8, 12, 16, 20, 32)
     uuid = "-".join(digest[a:b] for a, b in pairwise(cuts))
     header = struct.pack("<qIII?", MAGIC, _FORMAT, *_LIBRARY, True) + uuid.encode()
@@ -176,12 +178,12 @@ def _placed(descriptor: bytes, head: bytes, at: int, end: int) -> bytes:
     return descriptor + _OFFSETS.pack(grid_at, grid_at + len(head), end) + head
 
 
-def _buffers(grid: Grid, leaves: Leaves) -> list[bytes | memoryview]:
-    """Return every leaf's mask and active values, in parts."""
+def _buffers(grid: Grid, leaves: Leaves) -> bytes | memoryview:
+    """Return every leaf's mask and active values."""
     if grid.is_half:
-        return [_pack_halves(leaves)[0].data]
+        return _pack_halves(leaves)[0].data
     width, values = leaves.values.itemsize, leaves.values.data
-    parts, start = list[bytes | memoryview](), 0
+    parts, start = list[bytes](), 0
     for mask, end in zip(_coded_masks(leaves), leaves.ends, strict=True):
         numbers, size = values[start:end], width * (end - start)
         packed = _pack_floats(numbers)
@@ -190,7 +192,7 @@ def _buffers(grid: Grid, leaves: Leaves) -> list[bytes | memoryview]:
         else:  # a negative size: the numbers are not compressed
             parts += [mask, _SIZE.pack(-size), numbers.tobytes()]
         start = end
-    return parts
+    return b"".join(parts)
 
 
 def _holds(buffers: memoryview, grid: Grid, leaves: Leaves) -> bool:

@@ -5,13 +5,40 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.compiled import in_place, kernel
+from stereocell.kernels.compiled import in_place, kernel, part
 from stereocell.kernels.deflate import Space, write_stream
 
 LEAF = 8  # voxels along an edge of a leaf
 VOXELS = LEAF**3
 ONLY_ACTIVE_VALUES = 0  # code: inactive voxels have the value of the background
 HEAD = VOXELS // 8 + 1 + 8  # bytes before the values of a leaf: mask, code, size
+
+
+@part
+def _copy(
+    voxels: NDArray[Any],
+    back: int,
+    low: int,
+    left: int,
+    planes: tuple[int, int],
+    rows: tuple[int, int],
+    columns: tuple[int, int],
+    table: NDArray[Any] | None,
+    block: NDArray[Any],
+) -> None:
+    """Copy the voxels of a leaf, from the planes, rows and columns in it, to their places.
+
+    The arguments are those of `cut_leaves`, and the index of the leaf's first voxel. With constant
+    ranges the compiler unrolls the loops.
+    """
+    for i in range(columns[0], columns[1]):
+        for j in range(rows[0], rows[1]):
+            for k in range(planes[0], planes[1]):
+                voxel = voxels[back + k, low + j, left + i]
+                if table is None:
+                    block[(i * LEAF + j) * LEAF + k] = voxel
+                else:
+                    block[(i * LEAF + j) * LEAF + k] = table[voxel]
 
 
 @kernel
@@ -40,19 +67,24 @@ def cut_leaves(
     for leaf in range(len(corners)):
         left, low, back = corners[leaf]
         block = active[end : end + VOXELS]
-        is_cut = min(left, low, back) < 0
-        if is_cut or left + LEAF > width or low + LEAF > height or back + LEAF > depth:
+        is_whole = min(left, low, back) >= 0
+        if is_whole and left + LEAF <= width and low + LEAF <= height and back + LEAF <= depth:
+            _copy(voxels, back, low, left, (0, LEAF), (0, LEAF), (0, LEAF), table, block)
+            inactive = 0
+            for place in range(VOXELS):
+                inactive += block[place] == background
+            if not inactive:
+                masks[leaf] = 255
+                counts[leaf] = VOXELS
+                end += VOXELS
+                continue
+        else:
             for place in range(VOXELS):
                 block[place] = background
-        for k in range(max(-back, 0), min(LEAF, depth - back)):
-            for j in range(max(-low, 0), min(LEAF, height - low)):
-                for i in range(max(-left, 0), min(LEAF, width - left)):
-                    voxel = voxels[back + k, low + j, left + i]
-                    place = (i * LEAF + j) * LEAF + k
-                    if table is None:
-                        block[place] = voxel
-                    else:
-                        block[place] = table[voxel]
+            planes = max(-back, 0), min(LEAF, depth - back)
+            rows = max(-low, 0), min(LEAF, height - low)
+            columns = max(-left, 0), min(LEAF, width - left)
+            _copy(voxels, back, low, left, planes, rows, columns, table, block)
         count = 0
         for line in range(LEAF * LEAF):
             bits = 0
