@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 
+from stereocell.kernels.atlas import cut_slices
 from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse, collapse_interfaces
@@ -198,5 +199,8 @@ def compile_others() -> None:
     halves, floats = np.zeros(VOXELS, np.uint16), np.zeros(VOXELS, np.float32)
     cut_leaves(fixed["u1"], corner, np.zeros(256, np.uint16), np.uint16(0), bits, halves)
     cut_leaves(fixed["u2"], corner, None, np.float32(0), bits, floats)
+    cut_slices(
+        np.zeros((2, 2), np.uint16), np.zeros(1 << 16, np.uint8), np.zeros((2, 2, 2), np.uint8)
+    )
     ends, packed = np.array([VOXELS]), np.zeros(HEAD + MAX_BYTES, np.uint8)
     pack_halves(bits, ends, halves, make_space(), packed, ends.copy())
