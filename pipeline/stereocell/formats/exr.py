@@ -16,6 +16,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from stereocell.kernels.atlas import cut_slices
 from stereocell.model.channel import OpacityPoints
 from stereocell.model.errors import OutputError, StageError
 from stereocell.model.tile_content import APRON
@@ -70,7 +71,7 @@ def read_atlas(path: Path) -> NDArray[np.uint8]:
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             header, channels = dict(file.header()), file.channels()
-            image = np.array(channels["Y"].pixels) if "Y" in channels else None
+            image = channels["Y"].pixels if "Y" in channels else None
     # ValueError: the header is complete, but pixels are damaged
     except (RuntimeError, ValueError) as error:
         reason = " ".join(str(error).split())
@@ -87,11 +88,12 @@ def read_atlas(path: Path) -> NDArray[np.uint8]:
             f"{width} x {height} in {columns} x {rows} places"
         )
     if image.dtype == np.float16:
-        sheet = _bytes_of_halves()[image.view(np.uint16)]
-    else:  # another program wrote values of another type than half floats
-        sheet = _to_bytes(image)
-    slices = sheet.reshape(rows, height, columns, width).transpose(0, 2, 1, 3)
-    return np.ascontiguousarray(slices.reshape(-1, height, width)[:depth])
+        slices = np.empty((depth, height, width), np.uint8)
+        cut_slices(image.view(np.uint16), _bytes_of_halves(), slices)
+        return slices
+    sheet = _to_bytes(image)  # another program wrote values of another type than half floats
+    in_places = sheet.reshape(rows, height, columns, width).transpose(0, 2, 1, 3)
+    return np.ascontiguousarray(in_places.reshape(-1, height, width)[:depth])
 
 
 def read_rgb(path: Path) -> NDArray[np.float32]:

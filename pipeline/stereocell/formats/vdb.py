@@ -12,10 +12,8 @@ io/GridDescriptor.cc, io/Compression.h and tree/*.h (MPL-2.0; read, not copied).
 Both trees are Tree_float_5_4_3. Voxels equal to the background are inactive, and cost a bit each.
 
 density   The background is 0. Values are half floats, whose 11 bits hold steps of 1/255 exactly.
-          The active values of each leaf are compressed as by zlib, by libdeflate at level 1.
-          Three stains of 512 x 512 x 64 voxels, 92 to 97 % active, are 94.8 MB of half floats.
-          This takes 1.8 s and 45.6 MB. Others: zlib level 1 2.6 s and 46.7 MB; its Huffman codes
-          alone 1.8 s and 52.7 MB; zlib-ng 1.2 s and 64.2 MB; Blosc with LZ4 .6 s and 86.6 MB. A
+          The active values of each leaf are compressed as by zlib, by kernels/deflate.py, in less
+          than half of libdeflate's time and in the same space (docs/decisions/own-writers.md). A
           crop of real light-sheet data, 98 % active, becomes 28 % smaller by compression.
 measured  The background is the least value. Values are floats, which hold all numbers of 16 bits;
           half floats hold whole numbers only up to 2048. They are compressed by Blosc with LZ4, as
@@ -34,7 +32,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from imagecodecs import deflate_decode, deflate_encode
+from imagecodecs import deflate_decode
 from numcodecs import blosc
 from numpy.typing import NDArray
 
@@ -46,10 +44,12 @@ from stereocell.formats.vdb_tree import (
     find_leaves,
     make_transform,
 )
+from stereocell.kernels.deflate import MAX_BYTES, make_space
+from stereocell.kernels.vdb_leaves import HEAD, pack_halves
 from stereocell.model.errors import StageError
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.volume import zyx_to_xyz
-from stereocell.storage.atomic_write import write_bytes
+from stereocell.storage.atomic_write import replacing
 
 GRID_NAME = "density"
 MEASURED_NAME = "measured"
@@ -57,7 +57,8 @@ MEASURED_NAME = "measured"
 MAGIC = 0x56444220
 _FORMAT, _LIBRARY = 224, (12, 0)
 OLDEST_FORMAT = 222  # first format with today's layout of the head
-_DEFLATE_LEVEL, _LZ4_LEVEL, _SHUFFLE = 1, 9, 1
+_LZ4_LEVEL, _SHUFFLE = 9, 1
+_DECODED_APART = 16  # one of so many leaves of half floats is also decompressed by libdeflate
 _SIZE, _OFFSETS = struct.Struct("<q"), struct.Struct("<3q")
 _HEADER_BYTES = 65
 
@@ -96,17 +97,16 @@ def write_vdb(
     ('density', [0.5, 0.5, 2.0], [0.0, -2.5, 0.0])
     """
     grids, transform = _grids(density, first_um, spacing_um, measured, apron)
-    parts, at = [bytes(_HEADER_BYTES)], _HEADER_BYTES
+    parts, at = list[bytes | memoryview](), _HEADER_BYTES
     for grid in grids:
         leaves = find_leaves(grid)
         descriptor, head = describe(grid, leaves, transform)
         buffers = _buffers(grid, leaves)
-        end = at + len(descriptor) + _OFFSETS.size + len(head) + sum(map(len, buffers))
-        parts += [_placed(descriptor, head, at, end), *buffers]
+        end = at + len(descriptor) + _OFFSETS.size + len(head) + len(buffers)
+        parts += [_placed(descriptor, head, at, end), buffers]
         at = end
-    content = bytearray().join(parts)
-    content[:_HEADER_BYTES] = _header(memoryview(content)[_HEADER_BYTES:], len(grids))
-    write_bytes(path, content)
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        file.writelines([_header(parts, len(grids)), *parts])
 
 
 def is_vdb_of(
@@ -120,9 +120,8 @@ def is_vdb_of(
 ) -> bool:
     """Return whether a file holds exactly what `write_vdb` writes for the same arguments.
 
-    Header, heads and trees are compared byte by byte. Values are decompressed and then compared,
-    which takes a third of the time of compressing them again. Raises OSError if the file can't be
-    read.
+    Header, heads, trees and half floats are compared byte by byte, and floats after decompression,
+    which takes less time than to compress them again. Raises OSError if the file can't be read.
     """
     content = memoryview(path.read_bytes())
     grids, transform = _grids(density, first_um, spacing_um, measured, apron)
@@ -139,7 +138,7 @@ def is_vdb_of(
             at = end
     except (struct.error, RuntimeError, ValueError):  # a buffer is too short or damaged
         return False
-    header = _header(content[_HEADER_BYTES:], len(grids))
+    header = _header([content[_HEADER_BYTES:]], len(grids))
     return at == len(content) and bytes(content[:_HEADER_BYTES]) == header
 
 
@@ -161,9 +160,12 @@ def _grids(
     return grids, transform
 
 
-def _header(body: memoryview, grids: int) -> bytes:
+def _header(body: list[bytes | memoryview], grids: int) -> bytes:
     """Return the header of a file with a number of grids. Its UUID is a hash of the body."""
-    digest = hashlib.sha256(body).hexdigest().upper()
+    hashed = hashlib.sha256()
+    for part in body:
+        hashed.update(part)
+    digest = hashed.hexdigest().upper()
     cuts = (0, 8, 12, 16, 20, 32)
     uuid = "-".join(digest[a:b] for a, b in pairwise(cuts))
     header = struct.pack("<qIII?", MAGIC, _FORMAT, *_LIBRARY, True) + uuid.encode()
@@ -176,35 +178,56 @@ def _placed(descriptor: bytes, head: bytes, at: int, end: int) -> bytes:
     return descriptor + _OFFSETS.pack(grid_at, grid_at + len(head), end) + head
 
 
-def _buffers(grid: Grid, leaves: Leaves) -> list[bytes]:
-    """Return every leaf's mask and active values, in parts."""
-    pack = _pack_halves if grid.is_half else _pack_floats
+def _buffers(grid: Grid, leaves: Leaves) -> bytes | memoryview:
+    """Return every leaf's mask and active values."""
+    if grid.is_half:
+        return _pack_halves(leaves)[0].data
     width, values = leaves.values.itemsize, leaves.values.data
-    parts, start = [], 0
+    parts, start = list[bytes](), 0
     for mask, end in zip(_coded_masks(leaves), leaves.ends, strict=True):
         numbers, size = values[start:end], width * (end - start)
-        packed = pack(numbers)
+        packed = _pack_floats(numbers)
         if len(packed) < size:
             parts += [mask, _SIZE.pack(len(packed)), packed]
         else:  # a negative size: the numbers are not compressed
             parts += [mask, _SIZE.pack(-size), numbers.tobytes()]
         start = end
-    return parts
+    return b"".join(parts)
 
 
 def _holds(buffers: memoryview, grid: Grid, leaves: Leaves) -> bool:
     """Return whether buffers hold every leaf's mask and active values, and nothing else."""
-    unpack = _unpack_halves if grid.is_half else _unpack_floats
+    if grid.is_half:
+        return _holds_halves(buffers, leaves)
     values, start, at = leaves.values.data, 0, 0
     for mask, end in zip(_coded_masks(leaves), leaves.ends, strict=True):
         (size,) = _SIZE.unpack_from(buffers, at + len(mask))
         first, expected = at + len(mask) + _SIZE.size, values[start:end].tobytes()
         packed = buffers[first : first + abs(size)]
-        numbers = packed.tobytes() if size < 0 else unpack(packed, len(expected))
+        numbers = packed.tobytes() if size < 0 else _unpack_floats(packed, len(expected))
         if numbers != expected or buffers[at : at + len(mask)].tobytes() != mask:
             return False
         start, at = end, first + abs(size)
     return at == len(buffers)
+
+
+def _holds_halves(buffers: memoryview, leaves: Leaves) -> bool:
+    """Return whether buffers hold exactly the leaves of half floats.
+
+    Some leaves are also decompressed by another library than the one that compressed them.
+    """
+    packed, ends = _pack_halves(leaves)
+    if not np.array_equal(np.frombuffer(buffers, np.uint8), packed):
+        return False
+    values = leaves.values.data
+    for leaf in range(0, len(ends), _DECODED_APART):
+        at = ends[leaf - 1] if leaf else 0
+        start, end = leaves.ends[leaf - 1] if leaf else 0, leaves.ends[leaf]
+        stored, expected = buffers[at + HEAD : ends[leaf]].tobytes(), values[start:end].tobytes()
+        (size,) = _SIZE.unpack_from(buffers, at + HEAD - _SIZE.size)
+        if (deflate_decode(stored, out=len(expected)) if size > 0 else stored) != expected:
+            return False
+    return True
 
 
 def _coded_masks(leaves: Leaves) -> list[bytes]:
@@ -214,13 +237,13 @@ def _coded_masks(leaves: Leaves) -> list[bytes]:
     return coded_masks
 
 
-def _pack_halves(numbers: memoryview) -> bytes:
-    """Return half floats in the format of zlib."""
-    return bytes(deflate_encode(numbers.tobytes(), _DEFLATE_LEVEL))
-
-
-def _unpack_halves(packed: memoryview, size: int) -> bytes:
-    return bytes(deflate_decode(packed.tobytes(), out=size))
+def _pack_halves(leaves: Leaves) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    """Return every leaf's mask and half floats, and the end of each leaf in them."""
+    halves, ends = leaves.values.view(np.uint16), np.array(leaves.ends, np.int64)
+    packed = np.empty(halves.nbytes + HEAD * len(ends) + MAX_BYTES, np.uint8)
+    ends_in_packed = np.zeros(len(ends), np.int64)
+    pack_halves(leaves.masks, ends, halves, make_space(), packed, ends_in_packed)
+    return packed[: ends_in_packed[-1] if len(ends) else 0], ends_in_packed
 
 
 def _pack_floats(numbers: memoryview) -> bytes:

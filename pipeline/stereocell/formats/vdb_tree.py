@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.kernels import vdb_leaves
 from stereocell.kernels.vdb_leaves import LEAF, VOXELS, cut_leaves
 
 TREE = "Tree_float_5_4_3"
 ZIP, ACTIVE_MASK, BLOSC = 1, 2, 4
-ONLY_ACTIVE_VALUES = b"\x00"
+ONLY_ACTIVE_VALUES = bytes([vdb_leaves.ONLY_ACTIVE_VALUES])
 NODE4, NODE5 = 16, 32  # children along an edge of a node: leaves, nodes of leaves
 _HALF = (np.arange(256, dtype=np.float32) / 255).astype("<f2")
 # Types of voxels for which the kernel is compiled; others are converted

@@ -8,11 +8,13 @@ import sys
 
 import numpy as np
 
+from stereocell.kernels.atlas import cut_slices
 from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse, collapse_interfaces
 from stereocell.kernels.critical import find_critical
 from stereocell.kernels.crossings import find_candidates, find_maybe_flat, find_spread
+from stereocell.kernels.deflate import MAX_BYTES, make_space
 from stereocell.kernels.depth_buffer import find_visible
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
@@ -60,6 +62,7 @@ from stereocell.kernels.placement import (
 )
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
+from stereocell.kernels.shading import light_pixels
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.solid_counts import count_inside
@@ -73,7 +76,7 @@ from stereocell.kernels.triangle_rows import (
 )
 from stereocell.kernels.union_find import label_pairs
 from stereocell.kernels.value_counts import count_values
-from stereocell.kernels.vdb_leaves import VOXELS, cut_leaves
+from stereocell.kernels.vdb_leaves import HEAD, VOXELS, cut_leaves, pack_halves
 from stereocell.kernels.visibility import cast_rays
 from stereocell.kernels.xxhash import xxh32
 
@@ -163,7 +166,9 @@ def compile_others() -> None:
     mesh_of = np.zeros((1, 1), np.int32)
     corners, heights = np.ascontiguousarray(at[:, :2]), np.ones(4)
     drawn = triangles.astype(np.uint32)
-    find_visible(corners, heights, drawn, 0, near, mesh_of, which, np.ones((1, 1, 3)))
+    find_visible(corners, heights, drawn, 0, near, mesh_of, which, picture := np.ones((1, 1, 3)))
+    visible, lamps = (mesh_of, which, picture, drawn, corners), np.ones((1, 7))
+    light_pixels(0, *visible, at.astype(np.float32), at, at[:3], lamps, 0.1, 0.1, 0.1, picture)
     one = np.ones(1, np.float32)
     cast_rays(voxels > 0, points, points, points, points, one, one)
 
@@ -194,3 +199,8 @@ def compile_others() -> None:
     halves, floats = np.zeros(VOXELS, np.uint16), np.zeros(VOXELS, np.float32)
     cut_leaves(fixed["u1"], corner, np.zeros(256, np.uint16), np.uint16(0), bits, halves)
     cut_leaves(fixed["u2"], corner, None, np.float32(0), bits, floats)
+    cut_slices(
+        np.zeros((2, 2), np.uint16), np.zeros(1 << 16, np.uint8), np.zeros((2, 2, 2), np.uint8)
+    )
+    ends, packed = np.array([VOXELS]), np.zeros(HEAD + MAX_BYTES, np.uint8)
+    pack_halves(bits, ends, halves, make_space(), packed, ends.copy())

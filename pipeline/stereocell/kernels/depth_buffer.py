@@ -53,16 +53,18 @@ def find_visible(
         # Slivers count as flat, because their weights are noise.
         if abs(twice) <= 1e-6 * max(ab, ac, bc) ** 2 + 1e-12:
             continue
-        over_a, over_b, over_c = abs(twice) / bc, abs(twice) / ac, abs(twice) / ab
+        # A pixel counts as inside up to 1e-9 pixels beyond an edge.
+        beyond = -1e-9 / abs(twice)
+        least_a, least_b, least_c = beyond * bc, beyond * ac, beyond * ab
+        over_b, over_c, over_twice = acy / twice, aby / twice, 1 / twice
         for row in range(top, bottom + 1):
             y = row + 0.5 - ay
+            start_b, start_c = -y * acx * over_twice, y * abx * over_twice
             for column in range(left, right + 1):
                 x = column + 0.5 - ax
-                b = (x * acy - y * acx) / twice
-                c = (abx * y - aby * x) / twice
+                b, c = start_b + x * over_b, start_c - x * over_c
                 a = 1 - b - c
-                # A pixel counts as inside up to 1e-9 pixels beyond an edge.
-                if -a * over_a > 1e-9 or -b * over_b > 1e-9 or -c * over_c > 1e-9:
+                if a < least_a or b < least_b or c < least_c:
                     continue
                 here = depth[i] * a + depth[j] * b + depth[k] * c
                 if here > nearest[row, column]:

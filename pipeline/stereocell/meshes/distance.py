@@ -13,6 +13,7 @@ from stereocell.model.mesh import Mesh, Spread
 # Percent of the area; a sliver with less than 1 % of it may vanish without notice
 PERCENTILE = 99.0
 VERTICES = 50_000  # largest number of vertices that are measured for the largest distance
+FACING = 20_000  # number of points at which the normals of two meshes are compared
 # Mark of triangles that searches leave out; larger than the number of any point that is looked up
 NEVER = np.int32(np.iinfo(np.int32).max)
 # Um; points this close count as on the surface, because positions are rounded to float32
@@ -29,9 +30,9 @@ class Nearest:
     """
 
     def __init__(self, mesh: Mesh, samples: int, twins: NDArray[np.int32] | None = None) -> None:
-        self.points = spread_points(mesh.positions.astype(np.float64), mesh.triangles, samples)
         self.vertices = self._at = mesh.positions.astype(np.float64)
-        self.triangles = np.ascontiguousarray(mesh.triangles, np.int32)
+        self.triangles = self._own = np.ascontiguousarray(mesh.triangles, np.int32)
+        self.points, _ = spread_points(self._at, self._own, samples)
         self._twins = twins
         grid = make_grid(self._at, self.triangles)
         # The triangles' boxes are not kept: they would take a third of a large unit's memory.
@@ -45,7 +46,8 @@ class Nearest:
         """
         part = copy(self)
         is_gone = gone[self.triangles[:, 0]]
-        part.points = spread_points(self._at, self.triangles[~is_gone], len(self.points))
+        part._own = self.triangles[~is_gone]
+        part.points, _ = spread_points(self._at, part._own, len(self.points))
         part.vertices = self._at[~gone]
         part._seen, part._tick = np.where(is_gone, NEVER, np.int32(-1)), 0
         return part
@@ -57,6 +59,15 @@ class Nearest:
     def nearest_triangles(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the number of the triangle nearest to each point (n, 3), int64 (n,)."""
         return self._find(points)[1]
+
+    def normals_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the unit normal (n, 3) of the triangle nearest to each point (n, 3), um."""
+        return _unit_normals(self._at, self.triangles[self.nearest_triangles(points)])
+
+    def spread(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return points spread evenly over the area (count, 3), um, and the unit normals there."""
+        points, chosen = spread_points(self._at, self._own, count)
+        return points, _unit_normals(self._at, self._own[chosen])
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which points (n, 3) lie inside the mesh, or within ON_UM of it."""
@@ -94,10 +105,27 @@ def measure_spread(source: Nearest, target: Nearest) -> Spread:
     return Spread(float(sampled.mean()), p95, p99, largest)
 
 
+def measure_facing(source: Nearest, target: Nearest) -> float:
+    """Return the agreement of two meshes' normals, from 1 (best) to -1.
+
+    This is the cosine between a normal and that of the target's nearest triangle, averaged over
+    FACING points of the source's area.
+    """
+    points, normals = source.spread(FACING)
+    return float(np.einsum("nk,nk->n", normals, target.normals_at(points)).mean())
+
+
+def _unit_normals(at: NDArray[np.float64], triangles: NDArray[np.integer]) -> NDArray[np.float64]:
+    a, b, c = (at[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(normals / np.maximum(lengths, np.finfo(np.float64).tiny))
+
+
 def spread_points(
     at: NDArray[np.float64], triangles: NDArray[np.integer], count: int
-) -> NDArray[np.float64]:
-    """Return points spread evenly over the triangles' area, float64 (count, 3), um.
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return points spread evenly over the area, (count, 3), um, and their triangles, (count,).
 
     at         float64 (n, 3), um
     triangles  (m, 3)
@@ -112,6 +140,6 @@ def spread_points(
     # unreasonable effectiveness of quasirandom sequences", 2018
     u, v = (0.5 + place * 0.7548776662466927) % 1, (0.5 + place * 0.5698402909980532) % 1
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    corners = triangles[np.minimum(chosen, len(triangles) - 1)]
-    a, b, c = at[corners].transpose(1, 0, 2)
-    return a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    chosen = np.minimum(chosen, len(triangles) - 1)
+    a, b, c = at[triangles[chosen]].transpose(1, 0, 2)
+    return a + u[:, None] * (b - a) + v[:, None] * (c - a), chosen

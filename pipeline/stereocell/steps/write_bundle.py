@@ -28,7 +28,7 @@ class WriteBundle(Keyed):
     encoder  version of the package that encodes images; None: there is no image to encode
     """
 
-    VERSION: ClassVar[int] = 7
+    VERSION: ClassVar[int] = 8
 
     stage: tuple[object, ...]
     page: tuple[object, ...]

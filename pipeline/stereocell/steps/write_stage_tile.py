@@ -101,7 +101,7 @@ class WriteStageTile(Step[StageTile]):
     parts_dir  folder in which `part_tasks` wrote the channels' files; None: `run` writes them
     """
 
-    VERSION: ClassVar[int] = 3
+    VERSION: ClassVar[int] = 4
     FORM: ClassVar[Document[StageTile]] = Document(
         "units.schema.json#StageTile", asdict, _from_json, written_files.REMEDY
     )

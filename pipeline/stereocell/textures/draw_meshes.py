@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.kernels.shading import light_pixels
 from stereocell.model.color import to_srgb8
 from stereocell.textures.rasterize import Seen
 
@@ -23,7 +24,7 @@ _UP = np.array([0.0, 1.0, 0.0])
 _GROUND_LIGHT, _SKY_LIGHT = 0.06, 0.18
 # Direction to each lamp (right, up, towards the eye), and its linear light, 0..1
 _LAMPS = (((-0.5, 0.7, 1.0), 0.85), ((0.9, 0.1, 0.5), 0.2))
-_GLOSS, _GLOSS_POWER = 0.12, 25.0
+_GLOSS = 0.12  # share of the light that is mirrored
 _BACKGROUND = (0.0033, 0.0040, 0.0052)  # linear RGB
 _LINES = (0.148, 0.171, 0.214)  # linear RGB of the outlines of boxes
 _FINE = 2  # factor by which an image is drawn larger and then averaged down
@@ -78,7 +79,7 @@ def draw_pixels(
     picture, nearest = _shade(shapes, view)
     for low, high in boxes:
         _outline(picture, nearest, view, np.array([low, high]))
-    mean = _shrink(picture.reshape(*view.size, 3))
+    mean = _shrink(picture)
     return to_srgb8(mean.astype(np.float32))
 
 
@@ -98,14 +99,14 @@ def draw_side(shapes: Iterable[Shape], box: Box, axes: Vector, longest: int) -> 
     picture, nearest = _shade(shapes, view)
     is_hit = np.isfinite(nearest)[:, :, None].astype(np.float64)
     cover = _shrink(is_hit)
-    light = _shrink(picture.reshape(*size, 3) * is_hit) / np.maximum(cover, 1e-9)
+    light = _shrink(picture * is_hit) / np.maximum(cover, 1e-9)
     alpha = np.rint(255 * cover).astype(np.uint8)
     return np.concatenate([to_srgb8(light.astype(np.float32)), alpha], axis=2)
 
 
 def _shade(shapes: Iterable[Shape], view: _View) -> tuple[Vector, Vector]:
-    """Return the linear light (h * w, 3) of the nearest surfaces, and their depths (h, w)."""
-    picture = np.empty((view.size[0] * view.size[1], 3))
+    """Return the linear light (h, w, 3) of the nearest surfaces, and their depths (h, w)."""
+    picture = np.empty((*view.size, 3))
     picture[:] = _BACKGROUND
     seen = Seen.nothing(view.size)
     drawn = []
@@ -114,16 +115,33 @@ def _shade(shapes: Iterable[Shape], view: _View) -> tuple[Vector, Vector]:
         seen.add(number, places, depth, shape.triangles)
         drawn.append((shape, places))
     for number, (shape, places) in enumerate(drawn):  # pixels of hidden surfaces are not shaded
-        pixel, triangle, weights = seen.of(number)
-        at = shape.triangles[triangle]
-        shaded = np.einsum("nk,nkj->nj", weights, shape.normals[at].astype(np.float64))
-        shaded = shaded @ view.axes
-        shaded[_are_turned_away(places[at])] *= -1  # the inside is drawn, too
-        color = shape.color
-        if color.ndim == 2:
-            color = np.einsum("nk,nkj->nj", weights, color[at])
-        picture[pixel] = _light(shaded, color)
+        light_pixels(
+            number,
+            seen.mesh,
+            seen.triangle,
+            seen.weights,
+            np.ascontiguousarray(shape.triangles, np.uint32),
+            places,
+            np.ascontiguousarray(shape.normals, np.float32),
+            np.ascontiguousarray(np.atleast_2d(shape.color), np.float64),
+            np.ascontiguousarray(view.axes),
+            _lamps(),
+            _GROUND_LIGHT,
+            _SKY_LIGHT,
+            _GLOSS,
+            picture,
+        )
     return picture, seen.nearest
+
+
+def _lamps() -> Vector:
+    """Return for each lamp the direction to it, the direction halfway to the eye, and its light."""
+    lamps = []
+    for direction, light in _LAMPS:
+        to_lamp = np.array(direction) / np.linalg.norm(direction)
+        halfway = to_lamp + np.array([0.0, 0.0, 1.0])
+        lamps.append(np.r_[to_lamp, halfway / np.linalg.norm(halfway), light])
+    return np.array(lamps)
 
 
 def _shrink(drawn: Vector) -> Vector:
@@ -161,28 +179,6 @@ def _look_at(frame: Box, size: tuple[int, int], turned_deg: float) -> _View:
     return _View(axes, (low + high) / 2, scale, (height * _FINE, width * _FINE))
 
 
-def _are_turned_away(corners: Vector) -> NDArray[np.bool_]:
-    """Return which triangles (n, 3, 2), in pixels, show their inside: clockwise, as y is down."""
-    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    turned: NDArray[np.bool_] = ax * by - ay * bx > 0
-    return turned
-
-
-def _light(normals: Vector, color: Vector) -> Vector:
-    """Return the linear light (n, 3) of points by their normals (n, 3) of any length."""
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
-    sky = 0.5 + 0.5 * normals[:, 1]
-    diffuse = _GROUND_LIGHT * (1 - sky) + _SKY_LIGHT * sky
-    gloss = np.zeros(len(normals))
-    for direction, light in _LAMPS:
-        to_lamp = np.array(direction) / np.linalg.norm(direction)
-        halfway = to_lamp + np.array([0.0, 0.0, 1.0])
-        halfway /= np.linalg.norm(halfway)
-        diffuse += light * np.maximum(normals @ to_lamp, 0)
-        gloss += light * np.maximum(normals @ halfway, 0) ** _GLOSS_POWER
-    return diffuse[:, None] * color + _GLOSS * gloss[:, None]
-
-
 def _outline(picture: Vector, nearest: Vector, view: _View, ends: Vector) -> None:
     """Draw the edges of a box where no surface is nearer. ends: (2, 3), corners of the box."""
     height, width = view.size
@@ -202,4 +198,4 @@ def _outline(picture: Vector, nearest: Vector, view: _View, ends: Vector) -> Non
                 # Two pixels are one pixel wide after averaging.
                 for down, on in ((0, 0), (0, 1), (1, 0), (1, 1)):
                     seen = here >= nearest[row + down, column + on]
-                    picture[(row[seen] + down) * width + column[seen] + on] = _LINES
+                    picture[row[seen] + down, column[seen] + on] = _LINES

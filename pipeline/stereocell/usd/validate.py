@@ -269,7 +269,8 @@ def _is_inside_out(
     faces = np.cross(b - a, c - a)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         faces = -faces
-    return float((faces * normals[corners].sum(axis=1)).sum()) < 0
+    around = normals[corners[:, 0]] + normals[corners[:, 1]] + normals[corners[:, 2]]
+    return float(np.einsum("mk,mk->", faces, around)) < 0
 
 
 def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:

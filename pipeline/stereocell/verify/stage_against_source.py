@@ -6,7 +6,7 @@ reference does so, too. Distances are measured from each level to the reference 
 them are compared with the unit's record: the 99th percentile over both areas, by the same measure
 as a level's stated distance, and the largest one, vertices included. Surfaces must face the same
 way. Normals, occlusion, maps and UVs must equal the unit's. Every voxel of a volume is compared in
-8 bits, and the content of the stage's .vdb after decompression.
+8 bits, and the content of the stage's .vdb (formats/vdb.py).
 """
 
 from collections.abc import Iterator
@@ -20,12 +20,11 @@ from PIL import Image
 
 from stereocell.formats.exr import read_atlas
 from stereocell.formats.vdb import is_vdb_of
-from stereocell.meshes.distance import Nearest, measure_spread
-from stereocell.meshes.simplify import compact
+from stereocell.meshes.distance import Nearest, measure_facing, measure_spread
 from stereocell.meshes.small_bodies import SmallBodies
 from stereocell.model.errors import StereoCellError
 from stereocell.model.mesh import Lod, Mesh
-from stereocell.model.rigid_transform import Matrix
+from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.tile_content import APRON
 from stereocell.model.unit import Cover
 from stereocell.steps.build_unit import BuildUnit
@@ -117,6 +116,8 @@ def compare_unit(task: SourceTask) -> UnitFinding:
 
 
 def _placed(mesh: Mesh, placement: Matrix) -> Mesh:
+    if placement == IDENTITY:
+        return mesh
     move = np.array(placement)
     positions = mesh.positions.astype(np.float64) @ move[:3, :3].T + move[:3, 3]
     return Mesh(positions.astype(np.float32), mesh.triangles, mesh.normals)
@@ -135,19 +136,19 @@ class _Surfaces:
         self._spacing = min(given.lattice.spacing_um)
         self._bodies = SmallBodies(fine)
         self._placed = _placed(fine, placement)
-        self._known: dict[int, Nearest] = {}
+        self._known: dict[int, Nearest] = {}  # by the number of vertices that are left out
 
     def at(self, level: int) -> Nearest:
         """Return the reference surface of a level of detail."""
         error = self._errors[min(level, len(self._errors) - 1)] * self._spacing
         gone = self._bodies.find(error)
-        key = int(
-            gone.sum()
-        )  # components are left out in a fixed order, so the number identifies them
-        if key not in self._known:
-            left = self.triangles[~gone[self.triangles[:, 0]]]
-            self._known[key] = Nearest(compact(self._placed, left), self.samples)
-        return self._known[key]
+        if 0 not in self._known:
+            self._known[0] = Nearest(self._placed, self.samples)
+        # Components are left out in a fixed order, so the number of vertices identifies them.
+        count = int(gone.sum())
+        if count not in self._known:
+            self._known[count] = self._known[0].without(gone)
+        return self._known[count]
 
 
 def _compare_lods(
@@ -182,7 +183,7 @@ def _compare_lods(
                 f"{name}: found {largest:.4g} um as the largest distance, expected "
                 f"{lod.largest_um:.4g} as stated"
             )
-        if _facing(lod.mesh, to_fine) < 0:
+        if measure_facing(to_mesh, to_fine) < 0:
             problems.append(f"{name}: its triangles face inwards")
         quality = load_quality(stored["quality"])
         most_um = max(stored["distance_um"], quality.away.max, quality.back.max)
@@ -192,24 +193,6 @@ def _compare_lods(
                     f"{name}: the stage states {stated:.4g} um, expected {built:.4g} as in the unit"
                 )
     return tuple(levels), problems
-
-
-def _facing(mesh: Mesh, fine: Nearest) -> float:
-    """Return the agreement of a mesh's normals with the finest surface, from 1 (best) to -1.
-
-    This is the cosine between a triangle's normal and the nearest triangle's, averaged over area.
-    """
-    near = fine.nearest_triangles(mesh.positions.astype(np.float64)[mesh.triangles].mean(axis=1))
-    own, other = (
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        for corners in (
-            mesh.positions.astype(np.float64)[mesh.triangles],
-            fine.vertices[fine.triangles[near]],
-        )
-    )
-    lengths = np.maximum(np.linalg.norm(other, axis=1), np.finfo(np.float64).tiny)
-    area = float(np.linalg.norm(own, axis=1).sum())
-    return float(((own * other).sum(axis=1) / lengths).sum()) / area
 
 
 def _compare_shading(
@@ -230,8 +213,7 @@ def _odd_shading(lod: ComposedLod, wanted: Lod, placement: Matrix) -> Iterator[s
         if maps.normal is not None and mesh.uvs is not None and wanted.mesh.uvs is not None:
             yield "UVs"
         return  # the vertices differ; their distances are compared elsewhere
-    turned = wanted.mesh.normals.astype(np.float64) @ np.linalg.inv(np.array(placement)[:3, :3])
-    if (_unit(mesh.normals) * _unit(turned)).sum(axis=1).min(initial=1) < _ALONG:
+    if not _are_alike(mesh.normals, wanted.mesh.normals, placement):
         yield "normals"
     if wanted.normal_map is None:
         if baked is not None and not _is_like(mesh.openness, baked.openness / 255.0):
@@ -243,6 +225,15 @@ def _odd_shading(lod: ComposedLod, wanted: Lod, placement: Matrix) -> Iterator[s
         yield "normal map"
     if baked is not None and not _is_image(maps.occlusion, baked.openness):
         yield "occlusion map"
+
+
+def _are_alike(found: NDArray[np.float32], built: NDArray[np.float32], placement: Matrix) -> bool:
+    """Return whether normals (n, 3) are those of the unit, turned by its placement."""
+    if placement == IDENTITY and np.array_equal(found, built):
+        return True
+    turned = built.astype(np.float64) @ np.linalg.inv(np.array(placement)[:3, :3])
+    cosines = np.einsum("nk,nk->n", _unit(found), _unit(turned))
+    return bool(cosines.min(initial=1) >= _ALONG)
 
 
 def _unit(vectors: NDArray[Any]) -> NDArray[np.float64]:
