@@ -32,6 +32,7 @@ import vertexInsertions from "./insertions/surface.vert.glsl?raw";
 import surfaceFragment from "./shaders/surface.frag.glsl?raw";
 import depthFragment from "./shaders/surface_depth.frag.glsl?raw";
 import depthVertex from "./shaders/surface_depth.vert.glsl?raw";
+import { defineNeeds } from "./surface_needs";
 
 /**
  * Uniforms that all surfaces share: the disc's cone and the clip planes in the scene, metres, and
@@ -178,6 +179,7 @@ export class BlendedSurface {
     for (const material of materials) {
       this.patch(material);
       both.adopt(material);
+      defineNeeds(material, uniforms);
       material.forceSinglePass = true; // the depth pass already sorts front and back
       Object.assign(material, PREMULTIPLIED);
       // the loader turns depth off for translucent materials; here a depth pass precedes them
