@@ -4,6 +4,10 @@
  * So each object costs one draw call in stereo too, on any WebGL 2. Multiview would do the same,
  * but three.js supports it only when it draws straight into a headset's layer. These frames are
  * drawn in linear light and encoded at the end.
+ *
+ * Large opaque surfaces are drawn for one eye after the other. As instances, triangles that reach
+ * into the other eye's half are shaded and then discarded, and a shader with `discard` keeps a GPU
+ * from skipping hidden surfaces.
  */
 import {
   ArrayCamera,
@@ -40,6 +44,8 @@ const FRAGMENT = insertionsOf(includeChunks(fragmentInsertions, CHUNKS));
  * 2.
  */
 const BOTH = 4;
+/** Layer of the objects that are drawn for one eye after the other. */
+const EACH = 5;
 
 /**
  * Makes the uniforms that all materials which draw for both eyes share by reference. The matrices
@@ -86,6 +92,7 @@ export class BothEyes {
   /** Camera between the eyes that sees what either eye sees. */
   private readonly between = new PerspectiveCamera();
   private readonly adopted = new WeakSet<Material>();
+  private readonly forEach = new WeakSet<Object3D>();
   private isStereo = false;
   private readonly part = new Matrix4();
   private readonly point = new Vector3();
@@ -99,14 +106,27 @@ export class BothEyes {
   }
 
   /**
+   * Sets whether an object is drawn for one eye after the other, before all objects that are drawn
+   * for both at once.
+   */
+  drawForEach(object: Object3D, is: boolean): void {
+    if (is) this.forEach.add(object);
+    else this.forEach.delete(object);
+  }
+
+  /**
    * Makes all objects of a scene be drawn for both eyes. Call it before each frame, to include new
    * objects.
+   *
+   * @param isStereo whether the frame has two eyes
    */
-  prepare(scene: Object3D): void {
+  prepare(scene: Object3D, isStereo: boolean): void {
     scene.traverse((object) => {
       if (!isDrawn(object)) return;
+      const isForEach = isStereo && this.forEach.has(object);
       object.layers.disable(0);
-      object.layers.enable(BOTH);
+      object.layers.disable(isForEach ? BOTH : EACH);
+      object.layers.enable(isForEach ? EACH : BOTH);
       const { material } = object;
       if (!(material instanceof Material)) throw new TypeError(`${object.name} has many materials`);
       if (!this.adopted.has(material)) {
@@ -150,6 +170,7 @@ export class BothEyes {
     const { all, width_px, height_px } = eyes;
     camera.layers.set(layer);
     camera.layers.enable(0); // the layer of the lights
+    if (layer === BOTH) camera.layers.enable(EACH);
     between.layers.set(layer);
     camera.cameras = [];
     const [first, second] = all;
@@ -169,7 +190,8 @@ export class BothEyes {
       each.projectionMatrix.copy(first.camera.projectionMatrix);
       each.projectionMatrixInverse.copy(first.camera.projectionMatrixInverse);
     }
-    camera.cameras.push(between, ...all.map((eye) => eye.camera));
+    for (const eye of all) eye.camera.layers.enable(EACH);
+    camera.cameras.push(...all.map((eye) => eye.camera), between);
     uniforms.uMiddle.value = second?.viewport.x ?? 0;
     all.slice(0, 2).forEach(({ camera: eye, viewport: { x, y, z, w } }, i) => {
       const [right, up] = [(2 * x + z) / width_px - 1, (2 * y + w) / height_px - 1];

@@ -32,6 +32,7 @@ import vertexInsertions from "./insertions/surface.vert.glsl?raw";
 import surfaceFragment from "./shaders/surface.frag.glsl?raw";
 import depthFragment from "./shaders/surface_depth.frag.glsl?raw";
 import depthVertex from "./shaders/surface_depth.vert.glsl?raw";
+import { defineNeeds } from "./surface_needs";
 
 /**
  * Uniforms that all surfaces share: the disc's cone and the clip planes in the scene, metres, and
@@ -96,6 +97,11 @@ export type Share = Readonly<{
  * a millimetre for a specimen 1.2 m long.
  */
 const UNITS_APART = 32;
+/**
+ * Triangles of a mesh from which on it is drawn for one eye after the other. Smaller meshes have too
+ * few pixels for a draw call of their own.
+ */
+const LARGE_TRIANGLES = 20_000;
 /** Depth units between a translucent surface's colour and its depth pass. */
 const UNITS_BEHIND = 2;
 
@@ -151,6 +157,7 @@ const PREMULTIPLIED = {
 
 export class BlendedSurface {
   private readonly uniforms;
+  private readonly both: BothEyes;
   private readonly depth: ShaderMaterial;
   private readonly meshes: readonly Mesh[];
   private readonly depthMeshes: readonly Mesh[];
@@ -168,6 +175,7 @@ export class BlendedSurface {
     private readonly materials: readonly MeshStandardMaterial[],
     { uniforms, both }: SurfaceFrame,
   ) {
+    this.both = both;
     this.uniforms = {
       ...uniforms,
       uOpacity: { value: 1 },
@@ -178,6 +186,7 @@ export class BlendedSurface {
     for (const material of materials) {
       this.patch(material);
       both.adopt(material);
+      defineNeeds(material, uniforms);
       material.forceSinglePass = true; // the depth pass already sorts front and back
       Object.assign(material, PREMULTIPLIED);
       // the loader turns depth off for translucent materials; here a depth pass precedes them
@@ -251,6 +260,12 @@ export class BlendedSurface {
       material.transparent = this.isBlended;
       material.blending = this.isBlended ? CustomBlending : NormalBlending;
       material.needsUpdate = true; // the shader of an opaque surface leaves alpha out
+    }
+    // A blended surface has to be drawn after the surfaces and volumes behind it.
+    for (const mesh of this.meshes) {
+      const { index, attributes } = mesh.geometry;
+      const isLarge = (index ?? attributes.position).count >= 3 * LARGE_TRIANGLES;
+      this.both.drawForEach(mesh, isLarge && !this.isBlended);
     }
     for (const depthMesh of this.depthMeshes) {
       depthMesh.visible = this.isBlended;

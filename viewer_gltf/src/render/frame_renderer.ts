@@ -155,7 +155,7 @@ export class FrameRenderer {
     renderer.info.reset();
     specimenScene.aimLamps(head);
     specimenScene.isFlat = this.eyes.all.length === 1;
-    this.both.prepare(specimenScene.scene);
+    this.both.prepare(specimenScene.scene, this.eyes.all.length > 1);
     this.cuts.sync(clip, specimen);
     this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
