@@ -67,3 +67,25 @@ def test_a_process_that_keeps_its_memory_does_not_ask_the_system_for_it_again() 
 
     nothing, returned, kept = pages(0, ""), pages(40, ""), pages(40, "keep_freed_memory()")
     assert kept - nothing < 0.2 * (returned - nothing), (nothing, returned, kept)
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc has malloc_trim")
+def test_memory_that_was_kept_returns_to_the_system() -> None:
+    code = (
+        "import numpy as np, psutil\n"
+        "from stereocell.storage import processes\n"
+        "processes.keep_freed_memory()\n"
+        "process = psutil.Process()\n"
+        "start = process.memory_info().rss\n"
+        "arrays = [np.ones(8_000_000) for _ in range(10)]\n"
+        "small = np.ones(1000)\n"  # lies above the freed arrays, at the end of the heap
+        "del arrays\n"
+        "kept = process.memory_info().rss - start\n"
+        "processes.release_freed_memory()\n"
+        "print(kept, process.memory_info().rss - start)"
+    )
+    command = [sys.executable, "-c", code]
+    found = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    kept, left = map(int, found.split())
+    assert kept > 600e6
+    assert left < 0.2 * kept

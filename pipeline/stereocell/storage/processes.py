@@ -31,7 +31,8 @@ def keep_freed_memory() -> None:
 
     By default glibc returns each large array to the system. Linux then clears every page again when
     the next array is filled, which takes a sixth of a build's CPU time. The peak of the memory
-    grows by a few percent. Other C libraries lack these settings, and nothing changes there.
+    grows by a few percent. Other C libraries lack these settings, and nothing changes there. See
+    also `release_freed_memory`.
 
     Reference: https://www.gnu.org/software/libc/manual/html_node/Malloc-Tunable-Parameters.html
     """
@@ -41,6 +42,16 @@ def keep_freed_memory() -> None:
     if hasattr(libc, "mallopt"):
         libc.mallopt(_M_MMAP_MAX, 0)
         libc.mallopt(_M_TRIM_THRESHOLD, -1)
+
+
+def release_freed_memory() -> None:
+    """Return to the system what `keep_freed_memory` has kept.
+
+    Between two tasks of a build this is up to a gigabyte. The next task's arrays have other sizes,
+    so they would not fit into all of it, and the peak of the memory would grow from task to task.
+    """
+    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
+        libc.malloc_trim(0)
 
 
 def cores() -> int:
