@@ -15,14 +15,22 @@ def pack(blocks: list[np.ndarray]) -> list[bytes]:
     ends = np.cumsum([len(block) for block in blocks])
     packed = np.zeros(halves.nbytes + HEAD * len(blocks) + MAX_BYTES, np.uint8)
     masks = np.arange(64 * len(blocks), dtype=np.uint8).reshape(-1, 64)
-    cuts = np.zeros(len(blocks), np.int64)
-    pack_halves(masks, ends, halves, make_space(), packed, cuts)
-    return [part.tobytes() for part in np.split(packed[: cuts[-1]], cuts[:-1])]
+    left = packed[: pack_halves(masks, ends, halves, make_space(), packed)].tobytes()
+    buffers = []
+    while left:
+        end = HEAD + abs(size_of(left))
+        buffers.append(left[:end])
+        left = left[end:]
+    return buffers
+
+
+def size_of(buffer: bytes) -> int:
+    """Return the size of a leaf's values; a negative size: they are not compressed."""
+    return int(np.frombuffer(buffer[HEAD - 8 : HEAD], "<i8")[0])
 
 
 def numbers_of(buffer: bytes) -> np.ndarray:
-    size = int(np.frombuffer(buffer[HEAD - 8 : HEAD], "<i8")[0])
-    assert len(buffer) == HEAD + abs(size)
+    size = size_of(buffer)
     values = buffer[HEAD:]
     return np.frombuffer(zlib.decompress(values) if size > 0 else values, "<u2")
 

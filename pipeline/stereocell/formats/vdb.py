@@ -58,7 +58,6 @@ MAGIC = 0x56444220
 _FORMAT, _LIBRARY = 224, (12, 0)
 OLDEST_FORMAT = 222  # first format with today's layout of the head
 _LZ4_LEVEL, _SHUFFLE = 9, 1
-_DECODED_APART = 16  # one of so many leaves of half floats is also decompressed by libdeflate
 _SIZE, _OFFSETS = struct.Struct("<q"), struct.Struct("<3q")
 _HEADER_BYTES = 65
 
@@ -120,8 +119,9 @@ def is_vdb_of(
 ) -> bool:
     """Return whether a file holds exactly what `write_vdb` writes for the same arguments.
 
-    Header, heads, trees and half floats are compared byte by byte, and floats after decompression,
-    which takes less time than to compress them again. Raises OSError if the file can't be read.
+    Header, heads and trees are compared byte by byte. Values are decompressed and then compared.
+    Half floats are decompressed by libdeflate, so another program than their writer reads them.
+    Raises OSError if the file can't be read.
     """
     content = memoryview(path.read_bytes())
     grids, transform = _grids(density, first_um, spacing_um, measured, apron)
@@ -181,7 +181,7 @@ def _placed(descriptor: bytes, head: bytes, at: int, end: int) -> bytes:
 def _buffers(grid: Grid, leaves: Leaves) -> bytes | memoryview:
     """Return every leaf's mask and active values."""
     if grid.is_half:
-        return _pack_halves(leaves)[0].data
+        return _pack_halves(leaves).data
     width, values = leaves.values.itemsize, leaves.values.data
     parts, start = list[bytes](), 0
     for mask, end in zip(_coded_masks(leaves), leaves.ends, strict=True):
@@ -197,37 +197,17 @@ def _buffers(grid: Grid, leaves: Leaves) -> bytes | memoryview:
 
 def _holds(buffers: memoryview, grid: Grid, leaves: Leaves) -> bool:
     """Return whether buffers hold every leaf's mask and active values, and nothing else."""
-    if grid.is_half:
-        return _holds_halves(buffers, leaves)
+    unpack = _unpack_halves if grid.is_half else _unpack_floats
     values, start, at = leaves.values.data, 0, 0
     for mask, end in zip(_coded_masks(leaves), leaves.ends, strict=True):
         (size,) = _SIZE.unpack_from(buffers, at + len(mask))
         first, expected = at + len(mask) + _SIZE.size, values[start:end].tobytes()
         packed = buffers[first : first + abs(size)]
-        numbers = packed.tobytes() if size < 0 else _unpack_floats(packed, len(expected))
+        numbers = packed.tobytes() if size < 0 else unpack(packed, len(expected))
         if numbers != expected or buffers[at : at + len(mask)].tobytes() != mask:
             return False
         start, at = end, first + abs(size)
     return at == len(buffers)
-
-
-def _holds_halves(buffers: memoryview, leaves: Leaves) -> bool:
-    """Return whether buffers hold exactly the leaves of half floats.
-
-    Some leaves are also decompressed by another library than the one that compressed them.
-    """
-    packed, ends = _pack_halves(leaves)
-    if not np.array_equal(np.frombuffer(buffers, np.uint8), packed):
-        return False
-    values = leaves.values.data
-    for leaf in range(0, len(ends), _DECODED_APART):
-        at = ends[leaf - 1] if leaf else 0
-        start, end = leaves.ends[leaf - 1] if leaf else 0, leaves.ends[leaf]
-        stored, expected = buffers[at + HEAD : ends[leaf]].tobytes(), values[start:end].tobytes()
-        (size,) = _SIZE.unpack_from(buffers, at + HEAD - _SIZE.size)
-        if (deflate_decode(stored, out=len(expected)) if size > 0 else stored) != expected:
-            return False
-    return True
 
 
 def _coded_masks(leaves: Leaves) -> list[bytes]:
@@ -237,18 +217,20 @@ def _coded_masks(leaves: Leaves) -> list[bytes]:
     return coded_masks
 
 
-def _pack_halves(leaves: Leaves) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-    """Return every leaf's mask and half floats, and the end of each leaf in them."""
+def _pack_halves(leaves: Leaves) -> NDArray[np.uint8]:
+    """Return every leaf's mask and half floats."""
     halves, ends = leaves.values.view(np.uint16), np.array(leaves.ends, np.int64)
     packed = np.empty(halves.nbytes + HEAD * len(ends) + MAX_BYTES, np.uint8)
-    ends_in_packed = np.zeros(len(ends), np.int64)
-    pack_halves(leaves.masks, ends, halves, make_space(), packed, ends_in_packed)
-    return packed[: ends_in_packed[-1] if len(ends) else 0], ends_in_packed
+    return packed[: pack_halves(leaves.masks, ends, halves, make_space(), packed)]
 
 
 def _pack_floats(numbers: memoryview) -> bytes:
     """Return float32 numbers in a Blosc frame."""
     return bytes(blosc.compress(numbers, b"lz4", _LZ4_LEVEL, _SHUFFLE))
+
+
+def _unpack_halves(packed: memoryview, size: int) -> bytes:
+    return bytes(deflate_decode(packed.tobytes(), out=size))
 
 
 def _unpack_floats(packed: memoryview, size: int) -> bytes:

@@ -203,4 +203,4 @@ def compile_others() -> None:
         np.zeros((2, 2), np.uint16), np.zeros(1 << 16, np.uint8), np.zeros((2, 2, 2), np.uint8)
     )
     ends, packed = np.array([VOXELS]), np.zeros(HEAD + MAX_BYTES, np.uint8)
-    pack_halves(bits, ends, halves, make_space(), packed, ends.copy())
+    pack_halves(bits, ends, halves, make_space(), packed)

@@ -107,18 +107,17 @@ def pack_halves(
     halves: NDArray[np.uint16],
     space: Space,
     out: NDArray[np.uint8],
-    ends_in_out: NDArray[np.int64],
-) -> None:
+) -> int:
     """Write the buffers of leaves of half floats: mask, code, size, and compressed active values.
 
-    masks        (n, 64), see `cut_leaves`
-    ends         (n,), number of active values up to the end of each leaf
-    halves       active values of all leaves
-    space        of `make_space`
-    out          long enough for all values, HEAD bytes for each leaf, and MAX_BYTES
-    ends_in_out  (n,), filled with the ends of the buffers
+    masks   (n, 64), see `cut_leaves`
+    ends    (n,), number of active values up to the end of each leaf
+    halves  active values of all leaves
+    space   of `make_space`
+    out     long enough for all values, HEAD bytes for each leaf, and MAX_BYTES
 
-    Values that become no shorter are stored as they are, with a negative size.
+    Returns the number of bytes. Values that become no shorter are stored as they are, with a
+    negative size.
     """
     at, start = 0, 0
     for leaf in range(len(ends)):
@@ -135,4 +134,4 @@ def pack_halves(
         for k in range(8):
             out[values - 8 + k] = size >> 8 * k & 255
         at, start = values + abs(size), end
-        ends_in_out[leaf] = at
+    return at
