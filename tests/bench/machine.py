@@ -1,4 +1,4 @@
-"""Tell how fast this machine is, so that figures of different machines can be compared.
+"""Measure how fast this machine is, so that figures of different machines can be compared.
 
 A bench prints CPU seconds beside seconds. It also prints how long a fixed piece of work of another
 library takes on the same machine at the same time: the reference kernel. The ratio of both depends

@@ -34,7 +34,7 @@ from support.digests import digests_of
 GRID, TILE = (5, 2), (194, 512, 512)
 WAYS = ("1", "2", "cluster")
 CLUSTER_WORKERS = 2
-COMPARED = ("stage", "bundle")
+COMPARED = ("units", "stage", "bundle")
 
 
 def build(source: Path, out: Path, grid: tuple[int, int], way: str) -> dict[str, Cost]:
@@ -99,6 +99,7 @@ def main(
             f"{part}/{path}": digest
             for part in COMPARED
             for path, digest in digests_of(out / part).items()
+            if not path.endswith("seconds.json")
         }
     print_sizes(out)
     first, *others = digests.values()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from stereocell.filters import background
 from stereocell.filters.background import find_background
 from stereocell.model.tiling import Box
 from support.phantoms import blurred_ball
@@ -51,3 +52,23 @@ def test_a_block_larger_than_the_region_gives_a_constant() -> None:
     found = find_background(_ramp(), REGION, spacing_um=SPACING, block_um=1e6)
     assert found.values.shape == (1, 1, 1)
     assert found.at(REGION).shape == (1, 1, 1)
+
+
+@pytest.mark.slow
+def test_a_quarter_of_the_voxels_gives_the_background_of_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shape, noise = (64, 256, 260), 20.0
+    z, y, x = np.indices(shape)
+    body = np.sin(z / 5) * np.sin(y / 9) * np.sin(x / 9) > 0.4
+    values = 300 + 0.5 * x + 400 * body + np.random.default_rng(0).normal(0, noise, shape)
+    region = Box((0, 0, 0), shape)
+
+    def found() -> np.ndarray:
+        field = values.astype(np.float32)
+        return find_background(field, region, spacing_um=SPACING, block_um=9.0).at(region)
+
+    assert values.size >= background.SMALL
+    sampled = found()
+    monkeypatch.setattr(background, "SMALL", np.inf)
+    assert 0 < np.abs(sampled - found()).max() < 0.1 * noise

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numcodecs import blosc
 
 from stereocell.formats.packed_voxels import pack_voxels, unpack_voxels
 
@@ -21,6 +22,12 @@ def test_voxels_of_any_type_are_read_back(
     assert found.dtype == voxels.dtype
     np.testing.assert_array_equal(found, voxels.transpose(0, 2, 1))
     assert content == pack_voxels(found)
+
+
+def test_the_same_voxels_give_the_same_bytes_with_any_number_of_threads() -> None:
+    voxels = np.random.default_rng(0).normal(900, 200, (2, 1000, 1000)).astype(np.uint16)
+    assert len({pack_voxels(voxels) for _ in range(50)}) == 1
+    assert blosc.use_threads is None  # other users of Blosc keep their setting
 
 
 def test_smooth_voxels_take_less_room_than_plain_ones() -> None:

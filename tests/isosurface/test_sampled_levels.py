@@ -15,9 +15,22 @@ from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import Sums, TileEvidence, gather_evidence
 from stereocell.model.tiling import Box
 
-# Volumes with many bodies. The level of a single small body follows its few voxels.
 MADE = ("two classes", "shells", "tissue", "eight bit", "balls, 15%, x 1, 40 photons, uneven")
 REAL = ("nuclei", "CT bone", "MRI head", "mouse brain")
+# Volumes whose level follows the sample, and why
+FAILING = {
+    "one blob": "the level of a single small body follows its few voxels",
+    "light sheet, cells": "its sharpness, .041, is beside the bound of .04, below which another "
+    "field is chosen",
+}
+HALVED = [
+    *MADE,
+    *REAL,
+    *(
+        pytest.param(name, marks=pytest.mark.xfail(strict=True, reason=reason))
+        for name, reason in FAILING.items()
+    ),
+]
 SAME = 0.01  # share of a level's contrast by which it may differ
 SAMPLES = {
     "even rows": (slice(None), slice(0, None, 2)),
@@ -28,7 +41,7 @@ SAMPLES = {
 
 
 def _case(name: str) -> Case:
-    if name in REAL and data_folder() is None:
+    if name in (*REAL, "light sheet, cells") and data_folder() is None:
         pytest.skip("needs STEREOCELL_DATA")
     every = (*made_cases(), *family_cases(), *real_cases())
     return next(case for case in every if case.name == name)
@@ -68,7 +81,7 @@ def _level_of_part(search: LevelSearch, part: tuple[slice, ...]) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*MADE, *REAL])
+@pytest.mark.parametrize("name", HALVED)
 def test_the_level_is_the_same_on_half_of_the_voxels(name: str) -> None:
     search = search_levels(_case(name))
     level = search.found.shown()[0]
@@ -78,7 +91,7 @@ def test_the_level_is_the_same_on_half_of_the_voxels(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*MADE, *REAL])
+@pytest.mark.parametrize("name", [*MADE, *REAL, *FAILING])
 def test_the_level_is_the_same_on_a_mirrored_and_on_a_shifted_grid(name: str) -> None:
     case = _case(name)
     voxels, _ = case.load()

@@ -36,7 +36,7 @@ def numbers_of(buffer: bytes) -> np.ndarray:
 
 
 def fibonacci_block() -> np.ndarray:
-    """Return numbers whose bytes need the longest Huffman codes that so few bytes can need."""
+    """Return numbers whose bytes have very different counts, so that some get long codes."""
     counts = [1, 1]
     while sum(counts) + sum(counts[-2:]) <= MAX_NUMBERS:
         counts.append(sum(counts[-2:]))

@@ -36,17 +36,18 @@ def test_a_vertex_of_a_flat_surface_moves_straight_onto_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("move", "stays"), [((0.1, 0.1, 0.1), False), ((-2.0, 1.0, 0.0), True), ((0, 0, 6.0), True)]
+    ("move", "is_shortened"),
+    [((0.1, 0.1, 0.1), False), ((-2.0, 1.0, 0.0), True), ((0, 0, 6.0), True)],
 )
 def test_a_move_that_turns_or_sharpens_a_triangle_is_shortened(
-    move: tuple[float, float, float], stays: bool
+    move: tuple[float, float, float], is_shortened: bool
 ) -> None:
     start = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     triangles, sharpest = np.array([[0, 1, 2]], np.int32), float(np.cos(np.radians(12)))
     moves = np.zeros((3, 3))
     moves[1] = move
     shorten_moves(start, triangles, moves, sharpest, 4)
-    assert (np.linalg.norm(moves[1]) < np.linalg.norm(move)) == stays
+    assert (np.linalg.norm(moves[1]) < np.linalg.norm(move)) == is_shortened
     at = start + moves
     before, after = (np.cross(p[1] - p[0], p[2] - p[0]) for p in (start, at))
     assert before @ after >= 0.5 * np.linalg.norm(before) * np.linalg.norm(after)

@@ -33,7 +33,7 @@ _FINITE = 255 << 7  # upper 16 bits of the first float32 that is not finite
 Slices = tuple[slice, slice, slice]
 # Returns the background, float32 (slice, row, column), of a window's slices from one to another. It
 # broadcasts over them.
-Ground = Callable[[int, int], NDArray[np.float32]]
+Background = Callable[[int, int], NDArray[np.float32]]
 _NOISE_LEAST = 1e-6  # share of the scale's range: end of the first bin of differences
 
 
@@ -174,7 +174,7 @@ def gather_evidence(
     spacing_um: Spacing,
     counting: Counting,
     start: tuple[int, int, int] = (0, 0, 0),
-    background: Ground | None = None,
+    background: Background | None = None,
     criterion: Criterion | None = None,
 ) -> TileEvidence:
     """Return a tile's evidence.

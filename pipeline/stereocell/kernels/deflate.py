@@ -6,7 +6,7 @@ array, and positions before a block count as empty. Repeats are searched in whol
 bytes then lie alike. The streams have the same bytes on every processor.
 
 A block has at most 2 * MAX_NUMBERS + 1 symbols. So few symbols never need a Huffman code of more
-than 13 bits, as 14 need Fibonacci(17) - 1 symbols. The format allows 15.
+than 13 bits, as a code of 14 bits needs at least 1363. The format allows 15.
 
 References
 ----------
@@ -53,7 +53,7 @@ Place = tuple[Any, Any, Any]  # bits that wait, their number, and the word that 
 
 
 @step
-def _turned(code: int, bits: int) -> int:
+def _reversed_bits(code: int, bits: int) -> int:
     """Return a code with its first bit lowest, as the format stores codes."""
     code = (code & 0x5555) << 1 | code >> 1 & 0x5555
     code = (code & 0x3333) << 2 | code >> 2 & 0x3333
@@ -66,7 +66,7 @@ def _step_codes() -> NDArray[np.int64]:
     for bits in range(1, 8):
         code <<= 1
         for symbol in np.flatnonzero(bits == _STEP_BITS):
-            codes[symbol] = _turned(code, bits)
+            codes[symbol] = _reversed_bits(code, bits)
             code += 1
     return codes
 
@@ -129,7 +129,7 @@ def write_stream(
     size = 4 * word + (count + 7) // 8
     for k in range(size):
         out[at + k] = space.bytes[k]
-    low, high = _add_up(numbers, start, end)
+    low, high = _adler32(numbers, start, end)
     for k, byte in enumerate((high >> 8, high & 255, low >> 8, low & 255)):
         out[at + size + k] = byte
     return at + size + 4
@@ -179,7 +179,7 @@ def _replace_last(numbers: NDArray[np.uint16], at: int, last: NDArray[np.int64])
 
 
 @step
-def _add_up(numbers: NDArray[np.uint16], start: int, end: int) -> tuple[Any, Any]:
+def _adler32(numbers: NDArray[np.uint16], start: int, end: int) -> tuple[Any, Any]:
     """Return the two sums of Adler-32. The sums of a block are small, so one division is enough."""
     low, high, after = np.int64(1), np.int64(2 * (end - start)), np.int64(2 * (end - start))
     for i in range(start, end):
@@ -274,7 +274,7 @@ def _find_codes(space: Space, first: int, stop: int) -> None:
     for symbol in range(first, stop):
         bits = lengths[symbol]
         if bits:
-            space.entries[symbol] = _turned(following[bits], bits) << 5 | bits
+            space.entries[symbol] = _reversed_bits(following[bits], bits) << 5 | bits
             following[bits] += 1
 
 

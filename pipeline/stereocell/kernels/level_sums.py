@@ -7,7 +7,6 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.gradients import Field, Row, square_slopes
 
 Flags = NDArray[np.bool_]
-Mask = NDArray[np.bool_]
 Planes = NDArray[np.float64]
 Box = NDArray[np.int64]  # first and end (3, 2) of the voxels in a window that are counted
 _Index = np.uint64
@@ -135,7 +134,7 @@ def _sum_row(values: Row) -> float:
 
 
 @kernel
-def sum_neighbours(plane: Planes, padding: Mask, own: Box, scale: Row, sums: Planes) -> None:
+def sum_neighbours(plane: Planes, padding: Flags, own: Box, scale: Row, sums: Planes) -> None:
     """Add sums over a plane's voxels and over neighbours, as values less the scale's middle.
 
     plane    float64 (y, x), a window around the voxels that are counted
@@ -168,7 +167,7 @@ def sum_neighbours(plane: Planes, padding: Mask, own: Box, scale: Row, sums: Pla
 
 @part
 def _place_row(
-    plane: Planes, padding: Mask, y: int, scale: Row, values: Row, is_in: NDArray[np.int64]
+    plane: Planes, padding: Flags, y: int, scale: Row, values: Row, is_in: NDArray[np.int64]
 ) -> None:
     """Write a row's values less the middle, and 1 for each; 0 and 0 for padding and past the end.
 

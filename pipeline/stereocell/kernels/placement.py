@@ -87,7 +87,7 @@ def find_places(sums: Points, softness: float, most: float) -> Points:
 
 
 @part
-def _is_spoilt(start: Points, at: Points, a: int, b: int, c: int, sharpest: float) -> bool:
+def _is_worse(start: Points, at: Points, a: int, b: int, c: int, sharpest: float) -> bool:
     """Return whether a triangle turns too far between two positions, or gets too sharp."""
     ax, ay, az = doubled_area(start, a, b, c)
     nx, ny, nz = doubled_area(at, a, b, c)
@@ -120,7 +120,7 @@ def shorten_moves(
             if not (has_changed[a] | has_changed[b] | has_changed[c]):
                 continue
             least = min(shortened[a], min(shortened[b], shortened[c]))
-            if least < halvings and _is_spoilt(start, at, a, b, c, sharpest):
+            if least < halvings and _is_worse(start, at, a, b, c, sharpest):
                 is_due[a] = is_due[b] = is_due[c] = any_due = True
         for v in range(len(start)):
             has_changed[v] = is_due[v]

@@ -154,6 +154,9 @@ class WriteStageTile(Step[StageTile]):
         tables = {one.labels_id: one for one in self.tables}
         parts = None
         if self.parts_dir is not None:
+            for task in self.part_tasks():
+                if not task.is_whole():  # its files were moved when this step ran before, and died
+                    task.step.keep(task.place)
             places = [self._part_of(unit) for unit in self.units]
             parts = {place: _written(self.FORM.read(place / _RECORD)) for place in places}
         channels = []
