@@ -117,7 +117,7 @@ def is_vdb_of(
     measured: NDArray[Any] | None = None,
     apron: int = 0,
 ) -> bool:
-    """Return whether a file holds exactly what `write_vdb` writes for the same arguments.
+    """Return whether a file holds the same grids as `write_vdb` writes for the same arguments.
 
     Header, heads and trees are compared byte by byte. Values are decompressed and then compared.
     Half floats are decompressed by libdeflate, so another program than their writer reads them.
@@ -234,9 +234,10 @@ def _unpack_halves(packed: memoryview, size: int) -> bytes:
 
 
 def _unpack_floats(packed: memoryview, size: int) -> bytes:
-    (stated,) = struct.unpack_from("<I", packed, 4)
-    # The size is checked before memory is allocated.
-    return bytes(blosc.decompress(packed)) if stated == size else b""
+    unpacked_size, _, packed_size = struct.unpack_from("<3I", packed, 4)
+    # Blosc allocates memory and reads by these sizes.
+    fits = (unpacked_size, packed_size) == (size, len(packed))
+    return bytes(blosc.decompress(packed)) if fits else b""
 
 
 def check_vdb(path: Path) -> None:

@@ -203,8 +203,8 @@ class VdbValues:
         if bytes(self._data[at : at + 1]) != ONLY_ACTIVE_VALUES:
             raise ValueError("inactive values, expected background")
         if size > 0:
-            # The size is checked before memory is allocated.
-            if size < _FRAME_HEAD or struct.unpack_from("<2I", packed, 4)[0] != wanted:
+            # Blosc allocates memory and reads by the sizes that the frame states.
+            if size < _FRAME_HEAD or struct.unpack_from("<3I", packed, 4)[::2] != (wanted, size):
                 raise ValueError("a leaf has another size than its mask states")
             packed = blosc.decompress(packed)
         values = np.full(LEAF**3, self._background, np.float32)
