@@ -40,15 +40,15 @@ Build = Callable[[Watch], str]
 # Share of each phase in the time of a build; measured on one tile, 194 x 512 x 512 voxels, and
 # three channels.
 SHARES = {
-    "windows": 0.08,
-    "evidence": 0.13,
-    "components": 0.08,
-    "units": 0.3,
-    "stage": 0.2,
+    "windows": 0.1,
+    "evidence": 0.09,
+    "components": 0.03,
+    "units": 0.45,
+    "stage": 0.16,
     "tiles": 0.01,
-    "previews": 0.05,
-    "bundle": 0.09,
-    "report": 0.06,
+    "previews": 0.04,
+    "bundle": 0.08,
+    "report": 0.04,
 }
 _PREDICTABLE = 0.15  # share of a build from which its pace predicts the end; its start is slow
 _NICE = 10  # niceness, 0 to 19; a larger one means lower priority
