@@ -4,6 +4,8 @@ import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, prepareStand } from "../support/browser/stand";
 
 const SWITCHES = 10;
+/** Time without a change after which the number of objects counts as final. */
+const STABLE_MS = 1000;
 /** Bytes of JavaScript heap for compiled code and the driver's own handles; a volume takes more. */
 const HEAP_SLACK_BYTES = 2 * 1024 * 1024;
 /** Timer queries are not counted, because a few are always pending. */
@@ -75,12 +77,21 @@ describeInChromium("changing tiles", () => {
     await show(2 * tiles.length);
     const { volumes } = await stand.viewer.snapshot();
     expect(volumes.map(({ tile }) => tile)).toContain(tiles[tiles.length - 1]);
-    const [first, firstBytes] = [await counts(), await heapBytes()];
+    // objects of a busy worker are made and released a moment later
+    let first = await counts();
+    await expect
+      .poll(async () => {
+        const earlier = first;
+        await page.waitForTimeout(STABLE_MS);
+        first = await counts();
+        return KINDS.every((kind) => first[kind] === earlier[kind]);
+      })
+      .toBe(true);
+    const firstBytes = await heapBytes();
     expect(first.Texture).toBeGreaterThan(0);
     expect(first.Buffer).toBeGreaterThan(0);
     await show(SWITCHES);
-    // objects of a busy worker are released a moment later; a leak would stay
-    await expect.poll(counts).toEqual(first);
+    await expect.poll(counts).toEqual(first); // a leak would stay
     expect(await heapBytes()).toBeLessThan(firstBytes + HEAP_SLACK_BYTES);
   });
 
