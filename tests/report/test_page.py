@@ -271,7 +271,7 @@ def test_report_before_units_names_the_command(tmp_path: Path) -> None:
 
 def test_channels_without_a_clear_surface_have_remarks(built: Path) -> None:
     facts = gather(OutFolder(built))
-    assert [step.name for step in facts.steps][:2] == ["read", "volume"]
+    assert [step.name for step in facts.steps][:2] == ["read", "distance"]
     assert all(isinstance(step, StepFacts) for step in facts.steps)
     units = (
         _unit(),
