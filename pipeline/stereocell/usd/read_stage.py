@@ -215,6 +215,6 @@ def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileCh
         yield prim, choice
     finally:
         stage.Unload(path)
-        # what was selected while it was loaded, see `select_variant`
+        # `select_variant` selected variants of the loaded tile here. They no longer apply.
         if (selected := stage.GetSessionLayer().GetPrimAtPath(path)) is not None:
             selected.variantSelections.clear()

@@ -140,8 +140,6 @@ describeInChromium("stereo on the screen", () => {
     const same = differences(flat, alike);
     expect(same.length).toBeGreaterThan(500);
     expect(same.reduce((sum, each) => sum + each, 0) / same.length).toBeLessThan(2);
-    // At a ball's rim, reflected light changes fast between the vertices at which it is found.
-    expect(same[Math.floor(0.98 * same.length)]).toBeLessThan(4);
-    expect(same[Math.floor(0.99 * same.length)]).toBeLessThan(5);
+    expect(same[Math.floor(0.99 * same.length)]).toBeLessThan(4);
   });
 });

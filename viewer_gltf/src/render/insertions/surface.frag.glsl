@@ -1,7 +1,6 @@
 // Insertions into the fragment shader of three.js's standard material. A part may declare functions
 // for some surfaces and change `diffuseColor`.
 #insert start
-varying vec2 vReflected;
 #include <surface>
 #include <part/fragment_declared>
 
@@ -21,18 +20,6 @@ varying vec2 vReflected;
 #if defined(CUT) || defined(OPEN)
 	if (!gl_FrontFacing) normal = insideNormal(normal, cameraPosition);
 #endif
-
-// three.js looks up the light that a rough surface reflects for each fragment, which took a fifth of
-// a frame on a software renderer. Within the next chunk its call returns the value from the vertices.
-#insert before <lights_fragment_begin>
-#ifndef FLAT_SHADED
-#undef texture2D
-#define texture2D(table, at) vec4(vReflected, 0.0, 0.0)
-#endif
-
-#insert after <lights_fragment_begin>
-#undef texture2D
-#define texture2D texture
 
 #insert before <dithering_fragment>
 #ifndef OPAQUE
