@@ -16,9 +16,9 @@ from stereocell.preview.draw_slices import (
     OUTLINE,
     Slice,
     cross_section,
+    cut_middle_planes,
     cut_unit,
     draw_slices,
-    find_planes,
     voxels_of,
 )
 from stereocell.report import select_units
@@ -84,7 +84,7 @@ def _slices() -> list[Slice]:
     lattice, first, spacing = Box((2, 10, 20), (14, 50, 80)), (1.0, 2.0, 4.0), (0.5, 0.2, 0.2)
     center = np.array(first) + np.array([6, 8, 48]) * spacing
     volume = np.zeros(lattice.shape, np.uint8)
-    planes = find_planes(volume, lattice, spacing_um=spacing, sigma_um=0.2)
+    planes = cut_middle_planes(volume, lattice, spacing_um=spacing, sigma_um=0.2)
     ball = _ball(center, 1.0)
     return cut_unit(planes, first_um=first, spacing_um=spacing, mesh=ball, iso_at=None)
 
@@ -111,7 +111,7 @@ def test_picture_shows_the_outline_unmirrored_and_in_proportion() -> None:
 def test_field_minus_iso_value_is_zero_on_a_ramps_own_level() -> None:
     lattice = Box((0, 0, 0), (9, 16, 16))
     ramp = np.broadcast_to(np.arange(16, dtype=np.uint8) * 10, lattice.shape)
-    planes = find_planes(ramp, lattice, spacing_um=(1, 1, 1), sigma_um=0.7)
+    planes = cut_middle_planes(ramp, lattice, spacing_um=(1, 1, 1), sigma_um=0.7)
     slices = cut_unit(
         planes, first_um=(0, 0, 0), spacing_um=(1, 1, 1), mesh=None,
         iso_at=lambda box: np.full(box.shape, 70, np.float32),

@@ -46,8 +46,8 @@ _DISTANCE_SYMBOL = np.searchsorted(_DISTANCE_LEAST, np.arange(1025), side="right
 
 # RFC 1951, 3.2.7: the lengths of codes are themselves coded, in this order of their codes. Bits of
 # each code: tuned on three stains, 16-bit data, seen in 8 bits; other data takes a few bytes more.
-_STEP_ORDER = np.array([16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15])
-_STEP_BITS = np.array([3, 7, 7, 4, 3, 3, 3, 3, 4, 4, 5, 7, 7, 7, 7, 7, 7, 4, 5], np.int64)
+_LIST_ORDER = np.array([16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15])
+_LIST_BITS = np.array([3, 7, 7, 4, 3, 3, 3, 3, 4, 4, 5, 7, 7, 7, 7, 7, 7, 4, 5], np.int64)
 
 Place = tuple[Any, Any, Any]  # bits that wait, their number, and the word that they will fill
 
@@ -61,17 +61,17 @@ def _reversed_bits(code: int, bits: int) -> int:
     return ((code & 0xFF) << 8 | code >> 8) >> (16 - bits)
 
 
-def _step_codes() -> NDArray[np.int64]:
-    codes, code = np.zeros(len(_STEP_BITS), np.int64), 0
+def _list_codes() -> NDArray[np.int64]:
+    codes, code = np.zeros(len(_LIST_BITS), np.int64), 0
     for bits in range(1, 8):
         code <<= 1
-        for symbol in np.flatnonzero(bits == _STEP_BITS):
+        for symbol in np.flatnonzero(bits == _LIST_BITS):
             codes[symbol] = _reversed_bits(code, bits)
             code += 1
     return codes
 
 
-_STEP_CODES = _step_codes()
+_LIST_CODES = _list_codes()
 
 
 class Space(NamedTuple):
@@ -290,10 +290,10 @@ def _put(space: Space, place: Place, code: int, bits: int) -> Place:
 
 
 @step
-def _put_step(space: Space, place: Place, symbol: int, more: int, more_bits: int) -> Place:
+def _put_list_symbol(space: Space, place: Place, symbol: int, more: int, more_bits: int) -> Place:
     """Append a symbol of the list of lengths, and the bits after it."""
-    bits = _STEP_BITS[symbol]
-    return _put(space, place, _STEP_CODES[symbol] | more << bits, bits + more_bits)
+    bits = _LIST_BITS[symbol]
+    return _put(space, place, _LIST_CODES[symbol] | more << bits, bits + more_bits)
 
 
 @step
@@ -308,8 +308,8 @@ def _write_head(space: Space, place: Place) -> Place:
     # The last block of the stream, with its own codes; sizes of the three lists of lengths
     sizes = (literals - 257) << 3 | (distances - 1) << 8 | (19 - 4) << 13
     place = _put(space, place, 0b101 | sizes, 17)
-    for symbol in _STEP_ORDER:
-        place = _put(space, place, _STEP_BITS[symbol], 3)
+    for symbol in _LIST_ORDER:
+        place = _put(space, place, _LIST_BITS[symbol], 3)
     for k in range(distances):
         lengths[literals + k] = lengths[_LITERALS + k]  # both lists are one
     k, stop = 0, literals + distances
@@ -319,19 +319,19 @@ def _write_head(space: Space, place: Place) -> Place:
             run += 1
         k += run
         if length:
-            place = _put_step(space, place, length, 0, 0)
+            place = _put_list_symbol(space, place, length, 0, 0)
             run -= 1
         least, most = (3, 6) if length else (11, 138)
         symbol, bits = (16, 2) if length else (18, 7)
         while run >= least:
             some = min(run, most)
-            place = _put_step(space, place, symbol, some - least, bits)
+            place = _put_list_symbol(space, place, symbol, some - least, bits)
             run -= some
         if run >= 3:
-            place = _put_step(space, place, 17, run - 3, 3)
+            place = _put_list_symbol(space, place, 17, run - 3, 3)
             run = 0
         for _ in range(run):
-            place = _put_step(space, place, length, 0, 0)
+            place = _put_list_symbol(space, place, length, 0, 0)
     return place
 
 

@@ -82,7 +82,7 @@ class MiddlePlane:
         return self.view.plane(self.field - iso_at(self.box).transpose(self.view.order)[0])
 
 
-def find_planes(
+def cut_middle_planes(
     volume: NDArray[np.uint8],
     lattice: Box,
     *,

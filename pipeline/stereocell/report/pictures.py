@@ -20,7 +20,7 @@ from stereocell.report.draw_scenes import Picture, Scene, Surface
 from stereocell.report.facts import Facts, UnitFacts
 from stereocell.report.objects import LabelFacts
 from stereocell.report.select_units import choose_level, choose_units, thin_out
-from stereocell.report.unit_pictures import DrawnUnit, Level, UnitPictures, draw
+from stereocell.report.unit_pictures import DrawnIso, DrawnUnit, UnitPictures, draw
 
 MAX_PICTURED = 60  # largest number of units with pictures
 # Largest number of triangles in one picture, of a tile and of the whole specimen
@@ -144,17 +144,17 @@ def _unit_pictures(facts: Facts) -> dict[tuple[str, str], UnitPictures]:
     return wanted
 
 
-def _own_level(found: ChannelSurvey) -> Level | None:
+def _own_level(found: ChannelSurvey) -> DrawnIso | None:
     level, statistics = found.appearance.level, found.statistics
     if level is None:
         return None
-    return Level(level.field, statistics.background, statistics.window)
+    return DrawnIso(level.field, statistics.background, statistics.window)
 
 
-def _level_of(found: ChannelSurvey, other: OtherLevel) -> Level:
+def _level_of(found: ChannelSurvey, other: OtherLevel) -> DrawnIso:
     field = SurfaceLevel(other.value, None, 0.0).field
     background = found.statistics.background if other.above else None
-    return Level(field, background, found.statistics.window)
+    return DrawnIso(field, background, found.statistics.window)
 
 
 def _scene(facts: Facts, tile: Tile | None, labels: Sequence[LabelFacts] = ()) -> Scene:

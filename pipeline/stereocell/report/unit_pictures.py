@@ -11,7 +11,13 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box
-from stereocell.preview.draw_slices import Slice, cut_contour, cut_unit, draw_slices, find_planes
+from stereocell.preview.draw_slices import (
+    Slice,
+    cut_contour,
+    cut_middle_planes,
+    cut_unit,
+    draw_slices,
+)
 from stereocell.preview.views import MICROSCOPE, View
 from stereocell.report.draw_scenes import Picture, Scene, draw_scene
 from stereocell.steps.unit_files import (
@@ -25,7 +31,7 @@ from stereocell.storage.workspace import cached
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class DrawnIso:
     """An iso-value of a channel, voxel values.
 
     background  what is subtracted from the voxels before the comparison; None: nothing
@@ -68,8 +74,8 @@ class UnitPictures:
     views: tuple[View, View, View]
     has_slices: bool
     has_surface: bool
-    level: Level | None
-    others: tuple[Level, ...]
+    level: DrawnIso | None
+    others: tuple[DrawnIso, ...]
     threshold: float | None
 
     @property
@@ -105,7 +111,7 @@ def draw_unit(wanted: UnitPictures) -> DrawnUnit:
     slices: Picture | None = None
     others: tuple[Picture, ...] = ()
     if wanted.has_slices or wanted.others:
-        planes = find_planes(
+        planes = cut_middle_planes(
             volume,
             wanted.lattice,
             spacing_um=wanted.spacing_um,
