@@ -24,15 +24,19 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import call, make_sample, plan
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.isosurface.level_evidence import HALO, denoising_reach
 from stereocell.model.tiling import Box, cut
+from stereocell.planning.plan_source import source_of
 from stereocell.planning.survey_steps import evidence_step, window_step
 from stereocell.steps.find_window import JOINT_VOXELS, SURVEY_VOXELS
+from stereocell.steps.open_source import open_afresh
 from stereocell.transfer.joint_histogram import sample_boxes
 from support.phantoms import write_ome_zarr
 
 REAL = (194, 512, 512)
 REGION, CHANNELS = Box((0, 0, 0), (194, 5508, 10908)), 70  # voxels of the whole CyCIF dataset
 CHUNK = (32, 128, 128)  # voxels (z, y, x): a tile is four chunks wide and some six deep
+CHECKS = 2  # number of times that a command reads a source by http to see that it is the same
 MAX_READ = 1.3  # ratio of the bytes read to the bytes of touched chunks
 
 
@@ -70,7 +74,7 @@ class Reading:
 
     chunks   bytes that a unit reads, as a ratio to the chunks that its window touches
     window   bytes that a unit reads, as a ratio to the window itself
-    check    bytes that a command reads to recognise the planned source (64 MB at most)
+    check    bytes that a command reads to recognise the planned source: CHECKS times 64 MB at most
     """
 
     chunks: float
@@ -82,12 +86,14 @@ class Reading:
 class Survey:
     """Bytes read for iso-values, if tiles are four chunks wide, as with REAL and CHUNK.
 
-    chunks  ratio to the bytes of the chunks that the tiles touch
+    chunks  ratio to the bytes of the chunks that the tiles touch with their halos
     tiles   ratio to the bytes of the tiles themselves
+    halo    voxels (z, y, x) around a tile that are read, too
     """
 
     chunks: float
     tiles: float
+    halo: tuple[int, int, int]
 
 
 def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
@@ -95,11 +101,13 @@ def measure_reading(folder: Path, tile: tuple[int, int, int]) -> Reading:
     out = folder / "reading"
     with counting(folder) as (address, sent):
         plan(f"{address}/{source.name}", out, (3, 3), tile, "0")
-        check = take(sent)  # a plan reads only what it checks
         for unit in ("r0_c0/0", "r1_c1/0"):  # the first command also surveys all nine tiles
             take(sent)
             call("units", str(out), "--workers", "0", "--only", unit)
-        read = take(sent) - check
+        whole = take(sent)
+        open_afresh(source_of(OutFolder(out).plan())).fingerprint  # noqa: B018  it is computed now
+        check = CHECKS * take(sent)
+    read = whole - check
     settled = OutFolder(out).plan()
     middle = settled.tile("r1_c1")  # this tile has neighbours on all sides
     window = middle.lattice(settled.region).grown(settled.halo, settled.region)
@@ -119,13 +127,18 @@ def measure_survey(folder: Path, tile: tuple[int, int, int]) -> Survey:
         window = window_step(settled, channel).run()
         take(sent)
         for each in settled.tiles:
-            evidence_step(settled, each.box, channel=channel, window=window).run()
+            step = evidence_step(settled, each.box, channel=channel, window=window)
+            step.run()
         isos = take(sent)
+    reach = denoising_reach(step.smoothing_um, settled.spacing_um, 0)
+    z, y, x = (own + more for own, more in zip(reach, HALO, strict=True))
     region, chunk = settled.region, chunk_of(source)
+    read = (each.box.grown((z, y, x), region) for each in settled.tiles)
     voxel = stored(source, region) / math.prod(region.shape)
     return Survey(
-        isos / (voxel * sum(touched(each.box, chunk, region) for each in settled.tiles)),
+        isos / (voxel * sum(touched(box, chunk, region) for box in read)),
         isos / (voxel * sum(math.prod(each.box.shape) for each in settled.tiles)),
+        (z, y, x),
     )
 
 
@@ -203,7 +216,7 @@ def print_reading(reading: Reading, survey: Survey, windows: float) -> None:
           f"{MAX_READ}), {reading.window:.2f} x the window itself; by a command, to see that the "
           f"source is the same, {reading.check / 1e6:.1f} MB")  # fmt: skip
     print(f"Read for iso-values, tiles of four chunks' width: {survey.chunks:.2f} x the chunks "
-          f"that they touch (bound {MAX_READ}), {survey.tiles:.2f} x the tiles themselves; for a "
+          f"that they touch with halos (bound {MAX_READ}), {survey.tiles:.2f} x the tiles; for a "
           f"channel's window {windows:.2f} x the level and the blocks that it comes from "
           f"(bound {MAX_READ})")  # fmt: skip
 
@@ -220,7 +233,7 @@ def print_whole(
     grown = [tile.lattice(REGION).grown(halo, REGION) for tile in tiles]
     own = sum(math.prod(window.shape) for window in grown)
     around = sum(touched(window, CHUNK, REGION) for window in grown)
-    boxes = sum(touched(tile.box, CHUNK, REGION) for tile in tiles)
+    boxes = sum(touched(tile.box.grown(survey.halo, REGION), CHUNK, REGION) for tile in tiles)
     units, isos, displays = (
         CHANNELS * voxel * ratio * voxels
         for ratio, voxels in (

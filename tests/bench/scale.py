@@ -48,7 +48,8 @@ from support.worker_processes import workers_of
 
 COUNTS = ((2, 2), (4, 2), (4, 4), (8, 4))  # columns x rows: 4 to 32 units
 MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512 units
-WHOLE = len(cut(REGION, REAL)) * CHANNELS  # units of the CyCIF dataset
+TILES = len(cut(REGION, REAL))  # of the CyCIF dataset
+WHOLE = TILES * CHANNELS  # units of the CyCIF dataset
 PRICE = 0.04  # dollars for a core-hour: about what clouds ask for a core with 4 GB
 GIB = 1024**3
 MAX_GROWTH = 0.1  # largest relative growth of a process's peak memory with four times the tiles
@@ -171,10 +172,12 @@ def print_slope(runs: list[Run]) -> list[float]:
 
 
 def print_command(runs: list[Run]) -> None:
+    """Print what the command keeps of a tile: evidence of one channel, until its level is known."""
     peaks = [run.peaks["command"] for run in runs]
     each, base = np.polyfit([run.units for run in runs], peaks, 1)
-    print(f"  the command keeps {each / 1e6:.3f} MB of a unit beside {base / GIB:.3f} GiB: "
-          f"{(base + each * WHOLE) / GIB:.2f} GiB with {WHOLE}, if that goes on so")  # fmt: skip
+    most = (base + each * TILES) / GIB
+    print(f"  the command keeps {each / 1e6:.3f} MB of a channel's tile, and {base / GIB:.3f} GiB: "
+          f"{most:.2f} GiB with {TILES} tiles")  # fmt: skip
 
 
 def watch_memory(out: Path) -> dict[str, int]:
