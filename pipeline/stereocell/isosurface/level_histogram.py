@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from stereocell.filters.percentiles import find_median, find_percentiles
 from stereocell.model.lattice_field import LatticeField
 
 BINS = 4096
@@ -54,8 +55,9 @@ class Scale:
         The field is smoother than its voxels, so nearly all of it lies within their range. A few
         hot voxels lie beyond and are counted in the last bin.
         """
-        low, high = (float(v) for v in np.percentile(voxels, (0.001, 99.999)))
-        middle = float(np.median(voxels[~padding] if padding.any() else voxels))
+        low, high = find_percentiles(voxels, (0.001, 99.999))
+        kept = voxels[~padding] if padding.any() else voxels
+        middle = find_median(kept)
         margin = 0.05 * (high - low) or max(1.0, 1e-6 * abs(low))
         return cls(low - margin, high + margin, middle)
 

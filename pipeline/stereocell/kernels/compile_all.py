@@ -36,6 +36,7 @@ from stereocell.kernels.half_edges import (
     sum_gains,
     sum_normals,
 )
+from stereocell.kernels.hollows import count_faces, find_hollows
 from stereocell.kernels.interface_rings import find_orders
 from stereocell.kernels.interfaces import (
     bound_objects,
@@ -60,6 +61,7 @@ from stereocell.kernels.placement import (
     shorten_moves,
     sum_planes,
 )
+from stereocell.kernels.plane_distances import find_far
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
 from stereocell.kernels.shading import light_pixels
@@ -75,7 +77,13 @@ from stereocell.kernels.triangle_rows import (
     touch,
 )
 from stereocell.kernels.union_find import label_pairs
-from stereocell.kernels.value_counts import count_values
+from stereocell.kernels.value_counts import (
+    count_codes,
+    count_steps,
+    count_values,
+    look_up,
+    measure_steps,
+)
 from stereocell.kernels.vdb_leaves import HEAD, VOXELS, cut_leaves, pack_halves
 from stereocell.kernels.visibility import cast_rays
 from stereocell.kernels.xxhash import xxh32
@@ -177,12 +185,19 @@ def compile_others() -> None:
     measure_slopes(voxels, steps)
     divide_by_slopes(voxels, steps, 1e-6, 2.0)
     mask, every = voxels > 0, np.array([[0, 3]] * 3, np.int64)
-    one_bin, small = np.zeros(1 << 16, np.int16), np.float32(0.1)
+    one_bin, small, ones = np.zeros(1 << 16, np.int16), np.float32(0.1), np.ones(9, np.int64)
     sum_by_value(voxels, mask, every, steps, one_bin, small, small, small, 1)
     count_differences(voxels, mask, every, 1, one_bin, steps)
     sum_along_axes(voxels, mask, every)
-    count_values(steps, np.arange(2.0), 0.0, 1.0, True, np.zeros(1, np.int64))
-    ones = np.ones(9, np.int64)
+    count_values(steps, ones[:3], np.arange(2.0), 0.0, 1.0, True, np.zeros(1, np.int64))
+    codes, table = np.zeros(3, np.uint16), np.zeros(256, np.uint8)
+    count_codes(codes, np.zeros(1 << 16, np.int64))
+    look_up(codes, table, table[:3])
+    grey, gradients = np.zeros((3, 3, 3), np.uint8), np.zeros((1, 1, 1), np.float32)
+    measure_steps(grey, points[0], gradients)
+    count_steps(gradients[0], grey[0], small, np.zeros((1, 256), np.int64))
+    find_far(mask, steps, 1.0)
+    count_faces(find_hollows(mask).astype(np.uint32), mask, mask, 2)
     count_inside(voxels, mask, ones, ones, ones.astype(np.float32))
     sum_neighbours(np.zeros((3, 3)), mask[0], every[1:], steps, np.zeros((7, 3)))
     move_off_zero(voxels, np.float32(0.01))
