@@ -15,7 +15,7 @@ from stereocell.kernels.collapse import collapse, collapse_interfaces
 from stereocell.kernels.critical import find_critical
 from stereocell.kernels.crossings import find_candidates, find_maybe_flat, find_spread
 from stereocell.kernels.deflate import MAX_BYTES, make_space
-from stereocell.kernels.depth_buffer import find_visible
+from stereocell.kernels.depth_buffer import find_visible, place_points, weigh_pixels
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
 from stereocell.kernels.grid import bound_all, bound_boxes, count_entries, find_near, list_by_cell
@@ -64,7 +64,7 @@ from stereocell.kernels.placement import (
 from stereocell.kernels.plane_distances import find_far
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
-from stereocell.kernels.shading import light_pixels
+from stereocell.kernels.shading import light_pixels, shrink, shrink_visible
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.solid_counts import count_inside
@@ -170,13 +170,18 @@ def compile_others() -> None:
     xxh32(bytes(7))
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
     find_downhill(voxels, points.astype(np.float64), np.ones(3))
-    near, which = np.full((1, 1), -np.inf), np.zeros((1, 1), np.int64)
-    mesh_of = np.zeros((1, 1), np.int32)
+    near, which = np.full((1, 1), -np.inf), np.zeros((1, 1), np.int32)
+    mesh_of, picture = np.zeros((1, 1), np.int32), np.ones((1, 1, 3))
     corners, heights = np.ascontiguousarray(at[:, :2]), np.ones(4)
     drawn = triangles.astype(np.uint32)
-    find_visible(corners, heights, drawn, 0, near, mesh_of, which, picture := np.ones((1, 1, 3)))
-    visible, lamps = (mesh_of, which, picture, drawn, corners), np.ones((1, 7))
+    for each in (at, at.astype(np.float32)):
+        place_points(each, at[0], at[:3], 1.0, corners[0], corners.copy(), heights.copy())
+    find_visible(corners, heights, drawn, 0, near, mesh_of, which)
+    weigh_pixels(np.zeros(1, np.int64), 1, which, drawn, corners)
+    visible, lamps = (mesh_of, which, drawn, corners), np.ones((1, 7))
     light_pixels(0, *visible, at.astype(np.float32), at, at[:3], lamps, 0.1, 0.1, 0.1, picture)
+    shrink(picture, 1, picture)
+    shrink_visible(picture, near, 1, picture, near)
     one = np.ones(1, np.float32)
     cast_rays(voxels > 0, points, points, points, points, one, one)
 
