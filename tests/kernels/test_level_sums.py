@@ -68,5 +68,6 @@ def test_values_that_are_no_numbers_are_counted_in_the_first_bin() -> None:
 
 def test_a_histogram_without_width_has_all_values_in_one_bin() -> None:
     counts = np.zeros(4, np.int64)
-    count_values(np.array([0.0, np.nan, 1.0]), np.zeros(5), 0.0, 0.0, False, counts)
+    values, times = np.array([0.0, np.nan, 1.0]), np.ones(3, np.int64)
+    count_values(values, times, np.zeros(5), 0.0, 0.0, False, counts)
     assert counts.sum() == 1

@@ -7,6 +7,7 @@ from stereocell.model.image_plane import (
     back_of_three,
     find_slice_axis,
     first_of_three,
+    in_order,
     slices_back,
     slices_first,
 )
@@ -38,3 +39,15 @@ def test_arrays_and_triples_are_turned_in_the_same_way_and_back(axis: int) -> No
     assert turned.shape[0] == array.shape[axis]
     assert slices_back(turned, axis).shape == array.shape
     assert back_of_three(turned.shape, axis) == array.shape
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 0, 1), (1, 2, 0), (2, 1, 0)])
+def test_turned_arrays_are_put_in_order(axes: tuple[int, int, int]) -> None:
+    voxels = np.random.default_rng(0).integers(0, 999, (70, 65, 130)).astype(np.uint16)
+    turned = voxels.transpose(axes)[:, ::-1, ::-1]
+    for dtype in (None, np.float32):
+        found = in_order(turned, dtype)
+        assert found.flags.c_contiguous
+        assert found.dtype == (dtype or np.uint16)
+        assert (found == turned).all()
+    assert in_order(voxels) is voxels

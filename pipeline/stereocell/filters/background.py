@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from stereocell.filters.percentiles import find_percentile_in_place
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
@@ -79,7 +80,7 @@ def find_background(
             block = [(int(e[i]), int(e[i + 1])) for e, i in zip(edges, place, strict=True)]
             values = np.concatenate([sample.within(block) for sample in samples])
             if values.size:
-                knots[place] = np.percentile(values, PERCENTILE, overwrite_input=True)
+                knots[place] = find_percentile_in_place(values, PERCENTILE)
         rise = _smooth(knots)
         inner = inner + rise
         above = _to_the_ends(LatticeField((z, y, x), rise), field.shape)

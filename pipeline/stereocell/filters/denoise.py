@@ -21,6 +21,7 @@ from stereocell.model.image_plane import (
     MAX_RATIO,
     back_of_three,
     first_of_three,
+    in_order,
     slices_back,
     slices_first,
 )
@@ -48,26 +49,36 @@ def denoise(volume: Volume, sigma_um: float, max_shift: float | None = None) -> 
     >>> round(float(smoothed.mean()), -1), bool(smoothed.std() < 0.3 * noise.std())
     (100.0, True)
     """
+    return in_order(slices_back(denoise_slices(volume, sigma_um, max_shift), volume.slice_axis))
+
+
+def denoise_slices(
+    volume: Volume, sigma_um: float, max_shift: float | None = None
+) -> NDArray[np.float32]:
+    """Return the result of `denoise` with the axes (slice, row, column)."""
     return _filtered(volume, sigma_um, True, max_shift)
 
 
 def smooth(volume: Volume, sigma_um: float) -> NDArray[np.float32]:
     """Return the voxels after a Gaussian of sigma `sigma_um` (0: none); float32 (z, y, x)."""
-    return _filtered(volume, sigma_um, False, None)
+    return in_order(slices_back(_filtered(volume, sigma_um, False, None), volume.slice_axis))
 
 
 def _filtered(
     volume: Volume, sigma_um: float, has_median: bool, max_shift: float | None
 ) -> NDArray[np.float32]:
+    """Return the filtered voxels, float32 (slice, row, column)."""
     axis = volume.slice_axis
-    field = np.array(slices_first(volume.voxels, axis), np.float32, order="C")
+    field = in_order(slices_first(volume.voxels, axis), np.float32)
+    if np.may_share_memory(field, volume.voxels):  # the volume is not changed
+        field = field.copy()
     has_median = has_median and any(median_reach(volume.spacing_um, axis))
     if field.size and (sigma_um > 0 or has_median):
         steps = first_of_three(volume.spacing_um, axis)
         across, rows, columns = (gaussian(sigma_um / step) for step in steps)
         bound = np.float32(np.inf if max_shift is None else max_shift)
         smooth_in_place(field, across, rows, columns, has_median, bound)
-    return np.ascontiguousarray(slices_back(field, axis))
+    return field
 
 
 def median_reach(spacing_um: Spacing, slice_axis: int) -> tuple[int, int, int]:

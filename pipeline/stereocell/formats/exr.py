@@ -49,17 +49,16 @@ def write_atlas(path: Path, volume: NDArray[np.uint8]) -> None:
     # With this number of columns, the atlas is nearly square.
     columns = min(depth, max(1, round((depth * height / width) ** 0.5)))
     rows = -(-depth // columns)
-    slices = np.zeros((rows * columns, height, width), dtype=np.uint8)
-    slices[:depth] = volume
-    sheet = slices.reshape(rows, columns, height, width).transpose(0, 2, 1, 3)
-    image = _LEVELS[sheet.reshape(rows * height, columns * width)]
+    image = np.zeros((rows, height, columns, width), np.float16)
+    for place, slice_ in enumerate(volume):  # the indices of one slice fit into the cache
+        image[place // columns, :, place % columns] = _LEVELS[slice_]
     attributes = {
         "columns": columns,
         "rows": rows,
         "atlasSize": np.array([width, height, depth], dtype=np.int32),
         "apron": APRON,
     }
-    _write(path, {"Y": image}, attributes)
+    _write(path, {"Y": image.reshape(rows * height, columns * width)}, attributes)
 
 
 def read_atlas(path: Path) -> NDArray[np.uint8]:

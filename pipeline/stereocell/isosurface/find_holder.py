@@ -16,11 +16,10 @@ because the wall of a chest alone would be a sheet, too.
 from typing import Any
 
 import cc3d
-import edt
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from stereocell.filters.boxes import grow
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.holder_pieces import (
     BONE_HU,
@@ -33,6 +32,8 @@ from stereocell.isosurface.holder_pieces import (
     reaches_end,
     sizes_in_words,
 )
+from stereocell.kernels.hollows import count_faces, find_hollows
+from stereocell.kernels.plane_distances import find_far
 from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
@@ -71,7 +72,7 @@ def find_holder(voxels: NDArray[Any], spacing_um: Spacing, region: Box) -> Holde
     if float(voxels.min()) > MIN_HU or not solid.any():
         return None
     spacing = np.asarray(spacing_um)
-    (box,) = ndimage.find_objects(solid.astype(np.uint8))
+    box = _box_of(solid)
     side = min((s.stop - s.start) * step for s, step in zip(box, spacing, strict=True))
     depth = min(_DEPTH_UM, _DEPTH_SHARE * side)
     # The air around the solid changes nothing, beyond one layer of it.
@@ -86,8 +87,14 @@ def find_holder(voxels: NDArray[Any], spacing_um: Spacing, region: Box) -> Holde
         return None
     # The blurred rim is left out too, but not where it belongs to what stays.
     kept = solid & ~found
-    wide = ndimage.binary_dilation(found, iterations=2) & ~ndimage.binary_dilation(kept)
+    wide = grow(found, 2) & ~grow(kept, 1)
     return Holder(region, _cells_of(wide | found, kept), sizes_in_words(pieces))
+
+
+def _box_of(flags: NDArray[np.bool_]) -> list[slice]:
+    """Return the box around the flags that are set, of which there is at least one."""
+    ends = (np.flatnonzero(flags.any(axis=tuple({0, 1, 2} - {axis})))[[0, -1]] for axis in range(3))
+    return [slice(int(first), int(last) + 1) for first, last in ends]
 
 
 def _pieces_outside(
@@ -121,7 +128,7 @@ def _pieces_outside(
         piece = labels[near] == number
         if joined_share(piece, body[near], solid[near], spacing) > most_joined:
             continue
-        if is_within(labels == number, body):
+        if is_within(piece, near, body):
             continue
         found[near] |= piece
         sizes.append(size)
@@ -159,25 +166,15 @@ def _lungs(
 
     The foam of a table does not count, because only the table's own shell encloses it.
     """
-    hollow = np.zeros(solid.shape, bool)
-    for axis in range(3):
-        for closed, slice_ in zip(*(np.moveaxis(a, axis, 0) for a in (hollow, solid)), strict=True):
-            labels = cc3d.connected_components(~slice_, connectivity=4)
-            rim = [labels[0], labels[-1], labels[:, 0], labels[:, -1]]
-            inner = np.ones(int(labels.max()) + 1, bool)
-            inner[np.concatenate(rim)] = inner[0] = False
-            closed |= inner[labels]
-    labels = cc3d.connected_components(hollow, connectivity=6)
-    counts = np.bincount(labels.ravel())
-    means = np.bincount(labels.ravel(), weights=voxels.ravel()) / np.maximum(counts, 1)
-    # Numbers of faces of each hollow, by its label: at the body, and at anything solid
-    at_body, at_solid = np.zeros((2, len(counts)))
-    for axis in range(3):
-        moved = [np.moveaxis(a, axis, 0) for a in (labels, body, solid)]
-        for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
-            inside, near_body, near_solid = moved[0][here], moved[1][there], moved[2][there]
-            at_body += np.bincount(inside[near_body], minlength=len(counts))
-            at_solid += np.bincount(inside[near_solid], minlength=len(counts))
+    hollow = find_hollows(np.ascontiguousarray(solid))
+    found, count = cc3d.connected_components(hollow, connectivity=6, return_N=True)
+    labels = found.astype(np.uint32)
+    if not count:
+        return hollow
+    own = labels[hollow]
+    sums = np.bincount(own, weights=voxels[hollow], minlength=count + 1)
+    means = sums / np.maximum(np.bincount(own, minlength=count + 1), 1)
+    at_body, at_solid = count_faces(labels, body, np.ascontiguousarray(solid), count + 1)
     is_lung = (means > _LUNG_HU) & (at_body >= _ENCLOSED * at_solid) & (at_solid > 0)
     is_lung[0] = False
     return np.asarray(is_lung[labels])
@@ -190,8 +187,7 @@ def _near_cores(
     depth: float,
 ) -> NDArray[np.bool_] | None:
     """Return the part of a solid near its cores; None if nothing is thick enough."""
-    inside = edt.edt(solid, anisotropy=tuple(spacing), black_border=False)
-    deep = inside > depth
+    deep = find_far(~solid, spacing, depth)
     if 0 < dense_share(voxels, deep) <= _MAX_DENSE_SHARE:
         deep &= voxels <= BONE_HU
     cores = cc3d.connected_components(deep, connectivity=26)
@@ -200,10 +196,8 @@ def _near_cores(
     if not sizes.any():
         return None
     core = (sizes >= _CORE_SHARE * sizes.max())[cores] & (cores > 0)
-    away = edt.edt(~core, anisotropy=tuple(spacing), black_border=False)
-    near = cc3d.connected_components(
-        solid & (away <= depth + _SLACK * spacing.max()), connectivity=26
-    )
+    away = find_far(core, spacing, depth + _SLACK * float(spacing.max()))
+    near = cc3d.connected_components(solid & ~away, connectivity=26)
     holds = np.zeros(int(near.max()) + 1, bool)
     holds[np.unique(near[core])] = True  # parts near a core that are not joined to it do not count
     holds[0] = False
@@ -220,11 +214,12 @@ def _cells_of(mask: NDArray[np.bool_], kept: NDArray[np.bool_]) -> NDArray[np.bo
         factor += 1
     if factor == 1:
         return mask
-    ends = [(-(-n // factor), n) for n in mask.shape]
-    index = [np.arange(n) * cells // n for cells, n in ends]
-    held, holds_kept = np.zeros((2, *(cells for cells, _ in ends)), bool)
-    for place, target in ((mask, held), (kept, holds_kept)):
-        np.logical_or.at(
-            target, tuple(index[k][one] for k, one in enumerate(place.nonzero())), True
+    held, holds_kept = mask, kept
+    for axis, n in enumerate(mask.shape):
+        cells = -(-n // factor)
+        # Voxel k lies in cell k * cells // n, so the cells' first voxels are these.
+        first = -(-np.arange(cells) * n // cells)
+        held, holds_kept = (
+            np.logical_or.reduceat(flags, first, axis=axis) for flags in (held, holds_kept)
         )
     return held & ~holds_kept

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.filters.boxes import dilate
+from stereocell.filters.boxes import dilate, grow
 
 BONE_HU = 500.0
 _BONE_SHARE = 0.1  # largest share of a soft holder's voxels above BONE_HU; five holders had .02
@@ -62,7 +62,7 @@ def kind_of(
     if not is_soft:
         return "bone"
     dense = piece & (voxels > BONE_HU)
-    first, last = (ndimage.binary_dilation(dense, iterations=n) for n in _RING)
+    first, last = (grow(dense, n) for n in _RING)
     ring = last & ~first
     if not ring.any() or float(np.mean(solid[ring])) > _IN_AIR:
         return "bone"
@@ -74,13 +74,22 @@ def reaches_end(ends: NDArray[np.int64], shape: tuple[int, ...]) -> bool:
     return bool((ends[:, 0] == 0).any() or (ends[:, 1] == np.array(shape) - 1).any())
 
 
-def is_within(piece: NDArray[np.bool_], body: NDArray[np.bool_]) -> bool:
-    """Return whether most of a piece has the body on most sides."""
+def is_within(piece: NDArray[np.bool_], near: tuple[slice, ...], body: NDArray[np.bool_]) -> bool:
+    """Return whether most of a piece has the body on most sides.
+
+    piece  bool (z, y, x), in a box of the volume
+    near   place of that box
+    body   bool (z, y, x), the whole volume
+    """
     sides = np.zeros(np.count_nonzero(piece), np.uint8)
     for axis in range(3):
+        # The lines of voxels along the axis that meet the box, from end to end
+        lines = body[tuple(slice(None) if k == axis else near[k] for k in range(3))]
+        within = tuple(near[k] if k == axis else slice(None) for k in range(3))
         for way in (slice(None), slice(None, None, -1)):
             along = tuple(way if k == axis else slice(None) for k in range(3))
-            sides += np.logical_or.accumulate(body[along], axis=axis)[along][piece]
+            passed = np.logical_or.accumulate(lines[along], axis=axis)[along]
+            sides += passed[within][piece]
     return bool(np.mean(sides >= _MIN_DIRECTIONS) > 0.5)
 
 
@@ -144,7 +153,7 @@ def _clips(
 ) -> NDArray[np.bool_]:
     """Return small pieces of metal at the skin, such as electrodes, that touch left-out pieces."""
     dense = cc3d.connected_components(body & (voxels > BONE_HU), connectivity=26)
-    touched = np.unique(dense[ndimage.binary_dilation(found, iterations=2)])
+    touched = np.unique(dense[grow(found, 2)])
     is_clip = np.zeros(int(dense.max()) + 1, bool)
     for number in touched[touched > 0]:
         piece = dense == number

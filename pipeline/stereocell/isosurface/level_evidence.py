@@ -5,7 +5,7 @@ Every number is a sum over voxels, so the sums of all tiles are those of the dat
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ LAG = 4
 HALO = (1, 1, LAG)  # voxels (slice, row, column) around a tile that its evidence reads
 NOISE_BINS = 1024
 _PLANES = 16  # number of planes that are counted together
+_AT_ONCE = 1 << 18  # voxels in which padding is found together; they fit into a processor's cache
 _FINITE = 255 << 7  # upper 16 bits of the first float32 that is not finite
 Slices = tuple[slice, slice, slice]
 # Returns the background, float32 (slice, row, column), of a window's slices from one to another. It
@@ -148,12 +149,16 @@ def find_padding(
     if not any(_has_run(plane, (size[2] + 1) // 2) for plane in dark):
         return np.zeros(voxels.shape, bool)
     before = tuple(n // 2 for n in size)
-    flat = erode(dark, before, tuple(n - 1 - k for n, k in zip(size, before, strict=True)))
-    if not flat.any():
-        return flat
-    # Grow back to the run's own ends, and further to where denoising mixes it with its
-    # surroundings.
-    return dilate(flat, (reach[0], 2 * reach[1], 2 * reach[2]))
+    after = tuple(n - 1 - k for n, k in zip(size, before, strict=True))
+    found, planes = np.zeros(voxels.shape, bool), max(1, _AT_ONCE // dark[0].size)
+    for start in range(0, len(dark), planes):
+        part = slice(start, start + planes)
+        flat = erode(dark[part], before, after)
+        if flat.any():
+            # Grow back to the run's own ends, and further to where denoising mixes it with its
+            # surroundings.
+            found[part] = dilate(flat, (0, 2 * reach[1], 2 * reach[2]))
+    return dilate(found, (reach[0], 0, 0))
 
 
 def _has_run(flags: NDArray[np.bool_], length: int) -> bool:
@@ -299,11 +304,18 @@ def _to_sums(sums: NDArray[np.float64]) -> Sums:
 def _differences(
     field: NDArray[np.float32], padding: NDArray[np.bool_], own: Slices, scale: Scale
 ) -> NDArray[np.int64]:
+    first, edges = _noise_bins(scale)
+    return count_differences(field, padding, _box_of(own), LAG, first, edges)
+
+
+@lru_cache(maxsize=4)  # one channel's blocks are counted one after another
+def _noise_bins(scale: Scale) -> tuple[NDArray[np.int16], NDArray[np.float64]]:
+    """Return the first bin of differences with the same upper 16 bits, and the ends of the bins."""
     edges = noise_edges(scale)
     least = (np.arange(_FINITE, dtype=np.uint32) << 16).view(np.float32).astype(np.float64)
     first = np.full(1 << 16, NOISE_BINS - 1, np.int16)
     first[:_FINITE] = np.clip(np.searchsorted(edges, least, "right") - 1, 0, NOISE_BINS - 1)
-    return count_differences(field, padding, _box_of(own), LAG, first, edges)
+    return first, edges
 
 
 def _box_of(own: Slices) -> NDArray[np.int64]:

@@ -10,7 +10,7 @@ Recognition Letters 19, 1998. doi:10.1016/S0167-8655(98)00057-9
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from stereocell.filters.percentiles import find_median, find_percentiles
 from stereocell.model.lattice_field import LatticeField
 
 BINS = 4096
@@ -54,8 +55,9 @@ class Scale:
         The field is smoother than its voxels, so nearly all of it lies within their range. A few
         hot voxels lie beyond and are counted in the last bin.
         """
-        low, high = (float(v) for v in np.percentile(voxels, (0.001, 99.999)))
-        middle = float(np.median(voxels[~padding] if padding.any() else voxels))
+        low, high = find_percentiles(voxels, (0.001, 99.999))
+        kept = voxels[~padding] if padding.any() else voxels
+        middle = find_median(kept)
         margin = 0.05 * (high - low) or max(1.0, 1e-6 * abs(low))
         return cls(low - margin, high + margin, middle)
 
@@ -83,10 +85,15 @@ class Scale:
 
     def table(self) -> tuple[NDArray[np.int16], float]:
         """Return the bin of each of _FINE even steps from `low`, int16, and the step's width."""
-        step = (self.high - self.low) / _FINE
-        fine = self.low + (np.arange(_FINE) + 0.5) * step
-        table = np.clip(np.searchsorted(self.edges(), fine, "right") - 1, 0, BINS - 1)
-        return table.astype(np.int16), step
+        return _table_of(self)
+
+
+@lru_cache(maxsize=4)  # one channel's blocks are counted one after another
+def _table_of(scale: Scale) -> tuple[NDArray[np.int16], float]:
+    step = (scale.high - scale.low) / _FINE
+    fine = scale.low + (np.arange(_FINE) + 0.5) * step
+    table = np.clip(np.searchsorted(scale.edges(), fine, "right") - 1, 0, BINS - 1)
+    return table.astype(np.int16), step
 
 
 @dataclass(frozen=True, slots=True)

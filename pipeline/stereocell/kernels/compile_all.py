@@ -15,7 +15,7 @@ from stereocell.kernels.collapse import collapse, collapse_interfaces
 from stereocell.kernels.critical import find_critical
 from stereocell.kernels.crossings import find_candidates, find_maybe_flat, find_spread
 from stereocell.kernels.deflate import MAX_BYTES, make_space
-from stereocell.kernels.depth_buffer import find_visible
+from stereocell.kernels.depth_buffer import find_visible, place_points, weigh_pixels
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
 from stereocell.kernels.grid import bound_all, bound_boxes, count_entries, find_near, list_by_cell
@@ -36,6 +36,7 @@ from stereocell.kernels.half_edges import (
     sum_gains,
     sum_normals,
 )
+from stereocell.kernels.hollows import count_faces, find_hollows
 from stereocell.kernels.interface_rings import find_orders
 from stereocell.kernels.interfaces import (
     bound_objects,
@@ -60,9 +61,10 @@ from stereocell.kernels.placement import (
     shorten_moves,
     sum_planes,
 )
+from stereocell.kernels.plane_distances import find_far
 from stereocell.kernels.rims import thin_rim
 from stereocell.kernels.runs import find_runs, join_runs, mark_runs, measure_components
-from stereocell.kernels.shading import light_pixels
+from stereocell.kernels.shading import light_pixels, shrink, shrink_visible
 from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.solid_counts import count_inside
@@ -75,7 +77,13 @@ from stereocell.kernels.triangle_rows import (
     touch,
 )
 from stereocell.kernels.union_find import label_pairs
-from stereocell.kernels.value_counts import count_values
+from stereocell.kernels.value_counts import (
+    count_codes,
+    count_steps,
+    count_values,
+    look_up,
+    measure_steps,
+)
 from stereocell.kernels.vdb_leaves import HEAD, VOXELS, cut_leaves, pack_halves
 from stereocell.kernels.visibility import cast_rays
 from stereocell.kernels.xxhash import xxh32
@@ -162,13 +170,18 @@ def compile_others() -> None:
     xxh32(bytes(7))
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
     find_downhill(voxels, points.astype(np.float64), np.ones(3))
-    near, which = np.full((1, 1), -np.inf), np.zeros((1, 1), np.int64)
-    mesh_of = np.zeros((1, 1), np.int32)
+    near, which = np.full((1, 1), -np.inf), np.zeros((1, 1), np.int32)
+    mesh_of, picture = np.zeros((1, 1), np.int32), np.ones((1, 1, 3))
     corners, heights = np.ascontiguousarray(at[:, :2]), np.ones(4)
     drawn = triangles.astype(np.uint32)
-    find_visible(corners, heights, drawn, 0, near, mesh_of, which, picture := np.ones((1, 1, 3)))
-    visible, lamps = (mesh_of, which, picture, drawn, corners), np.ones((1, 7))
+    for each in (at, at.astype(np.float32)):
+        place_points(each, at[0], at[:3], 1.0, corners[0], corners.copy(), heights.copy())
+    find_visible(corners, heights, drawn, 0, near, mesh_of, which)
+    weigh_pixels(np.zeros(1, np.int64), 1, which, drawn, corners)
+    visible, lamps = (mesh_of, which, drawn, corners), np.ones((1, 7))
     light_pixels(0, *visible, at.astype(np.float32), at, at[:3], lamps, 0.1, 0.1, 0.1, picture)
+    shrink(picture, 1, picture)
+    shrink_visible(picture, near, 1, picture, near)
     one = np.ones(1, np.float32)
     cast_rays(voxels > 0, points, points, points, points, one, one)
 
@@ -177,12 +190,19 @@ def compile_others() -> None:
     measure_slopes(voxels, steps)
     divide_by_slopes(voxels, steps, 1e-6, 2.0)
     mask, every = voxels > 0, np.array([[0, 3]] * 3, np.int64)
-    one_bin, small = np.zeros(1 << 16, np.int16), np.float32(0.1)
+    one_bin, small, ones = np.zeros(1 << 16, np.int16), np.float32(0.1), np.ones(9, np.int64)
     sum_by_value(voxels, mask, every, steps, one_bin, small, small, small, 1)
     count_differences(voxels, mask, every, 1, one_bin, steps)
     sum_along_axes(voxels, mask, every)
-    count_values(steps, np.arange(2.0), 0.0, 1.0, True, np.zeros(1, np.int64))
-    ones = np.ones(9, np.int64)
+    count_values(steps, ones[:3], np.arange(2.0), 0.0, 1.0, True, np.zeros(1, np.int64))
+    codes, table = np.zeros(3, np.uint16), np.zeros(256, np.uint8)
+    count_codes(codes, np.zeros(1 << 16, np.int64))
+    look_up(codes, table, table[:3])
+    grey, gradients = np.zeros((3, 3, 3), np.uint8), np.zeros((1, 1, 1), np.float32)
+    measure_steps(grey, points[0], gradients)
+    count_steps(gradients[0], grey[0], small, np.zeros((1, 256), np.int64))
+    find_far(mask, steps, 1.0)
+    count_faces(find_hollows(mask).astype(np.uint32), mask, mask, 2)
     count_inside(voxels, mask, ones, ones, ones.astype(np.float32))
     sum_neighbours(np.zeros((3, 3)), mask[0], every[1:], steps, np.zeros((7, 3)))
     move_off_zero(voxels, np.float32(0.01))

@@ -1,11 +1,41 @@
-"""Find the triangle nearest to the eye at each pixel of an image."""
+"""Project a mesh, and find the triangle nearest to the eye at each pixel of an image."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.compiled import kernel
+from stereocell.kernels.compiled import kernel, part
+
+
+@kernel
+def place_points(
+    points: NDArray[np.floating],
+    centre: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    scale: float,
+    middle: NDArray[np.float64],
+    places: NDArray[np.float64],
+    depth: NDArray[np.float64],
+) -> None:
+    """Write where points lie in an image, and how deep; a matrix product would start threads.
+
+    points  (n, 3), float32 or float64, world
+    centre  (3,), point in the middle of the image
+    axes    (3, 3), columns point right, up, and to the eye in the world
+    scale   pixels for each unit of length
+    middle  (2,), middle of the image in pixels: x right, y down
+    places  (n, 2), pixels: x right, y down
+    depth   (n,), larger is nearer
+    """
+    for n in range(len(points)):
+        x = np.float64(points[n, 0]) - centre[0]
+        y = np.float64(points[n, 1]) - centre[1]
+        z = np.float64(points[n, 2]) - centre[2]
+        right = x * axes[0, 0] + y * axes[1, 0] + z * axes[2, 0]
+        up = x * axes[0, 1] + y * axes[1, 1] + z * axes[2, 1]
+        places[n, 0], places[n, 1] = middle[0] + scale * right, middle[1] - scale * up
+        depth[n] = x * axes[0, 2] + y * axes[1, 2] + z * axes[2, 2]
 
 
 @kernel
@@ -16,8 +46,7 @@ def find_visible(
     number: int,
     nearest: NDArray[np.float64],
     mesh_of: NDArray[np.int32],
-    triangle_of: NDArray[np.int64],
-    weights_of: NDArray[np.float64],
+    triangle_of: NDArray[np.int32],
 ) -> None:
     """Write where a mesh is nearer to the eye than all before it: at which triangle, and how deep.
 
@@ -28,7 +57,6 @@ def find_visible(
     nearest      (height, width), depth; minus infinity where nothing is visible
     mesh_of      (height, width), number of the visible mesh
     triangle_of  (height, width)
-    weights_of   (height, width, 3), barycentric coordinates
     """
     last_row, last_column = nearest.shape[0] - 1, nearest.shape[1] - 1
     for triangle in range(len(triangles)):
@@ -71,6 +99,38 @@ def find_visible(
                     nearest[row, column] = here
                     mesh_of[row, column] = number
                     triangle_of[row, column] = triangle
-                    weights_of[row, column, 0] = a
-                    weights_of[row, column, 1] = b
-                    weights_of[row, column, 2] = c
+
+
+@part
+def weigh(
+    places: NDArray[np.float64], i: int, j: int, k: int, row: int, column: int
+) -> tuple[float, float, float]:
+    """Return the barycentric coordinates of a pixel's centre, as `find_visible` computes them."""
+    (ax, ay), (bx, by), (cx, cy) = places[i], places[j], places[k]
+    abx, aby, acx, acy = bx - ax, by - ay, cx - ax, cy - ay
+    twice = abx * acy - aby * acx
+    x, y, over_twice = column + 0.5 - ax, row + 0.5 - ay, 1 / twice
+    b = -y * acx * over_twice + x * (acy / twice)
+    c = y * abx * over_twice - x * (aby / twice)
+    return 1 - b - c, b, c
+
+
+@kernel
+def weigh_pixels(
+    pixels: NDArray[np.int64],
+    width: int,
+    triangle_of: NDArray[np.int32],
+    triangles: NDArray[np.uint32],
+    places: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the barycentric coordinates (k, 3) of pixels of one mesh.
+
+    pixels       (k,), row * width + column
+    triangle_of  (height, width), see `find_visible`
+    """
+    weights = np.empty((len(pixels), 3))
+    for n in range(len(pixels)):
+        row, column = pixels[n] // width, pixels[n] % width
+        i, j, k = triangles[triangle_of[row, column]]
+        weights[n, 0], weights[n, 1], weights[n, 2] = weigh(places, i, j, k, row, column)
+    return weights

@@ -1,5 +1,7 @@
 """Convert between colour spaces: linear RGB, sRGB and CIELab."""
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,9 +21,38 @@ def to_srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     linear  float32, any shape, 0..1; values outside are clipped
     result  uint8, same shape, 0..255
     """
-    clipped = np.clip(linear.astype(np.float64), 0, 1)
-    bent = 1.055 * clipped ** (1 / 2.4) - 0.055
-    return np.round(255 * np.where(clipped <= 0.0031308, 12.92 * clipped, bent)).astype(np.uint8)
+    # A table by the upper half of a float32's bits takes a fifth of the time of a power. The values
+    # of an entry become at most two different bytes.
+    first, least = _srgb_table()
+    clipped = np.clip(np.asarray(linear, np.float32), 0, 1)
+    found = first[clipped.view(np.uint32) >> 16]
+    found += clipped >= least[found]
+    return found
+
+
+@cache
+def _srgb_table() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Return the byte of the least float32 with each upper half of its bits, 0 for values above 1.
+
+    The second array (256,) has the least float32 that becomes a larger byte; infinity for 255.
+    """
+    low, high = np.zeros(255, np.uint32), np.full(255, np.float32(1).view(np.uint32))
+    while (high - low > 1).any():  # the bits of positive floats rise with their values
+        middle = (low + high) // 2
+        is_larger = _bend(middle.view(np.float32)) > np.arange(255)
+        low, high = np.where(is_larger, low, middle), np.where(is_larger, middle, high)
+    least = np.append(high.view(np.float32), np.float32(np.inf))
+    starts = np.arange(1 << 16, dtype=np.uint32) << 16
+    first = np.searchsorted(least, starts.view(np.float32), "right").astype(np.uint8)
+    first[starts > np.float32(1).view(np.uint32)] = 0
+    return first, least
+
+
+def _bend(linear: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return sRGB of linear light 0..1, rounded to whole numbers 0..255."""
+    exact = linear.astype(np.float64)
+    bent = 1.055 * exact ** (1 / 2.4) - 0.055
+    return np.asarray(np.round(255 * np.where(exact <= 0.0031308, 12.92 * exact, bent)))
 
 
 def linear_color(rgb: tuple[int, int, int]) -> tuple[float, float, float]:

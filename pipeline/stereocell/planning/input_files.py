@@ -9,7 +9,7 @@ from dataclasses import replace
 from stereocell.model.errors import SourceError
 from stereocell.planning.settings import PlanOptions
 from stereocell.read import Dataset
-from stereocell.steps.open_source import SourceRef, open_source
+from stereocell.steps.open_source import SourceRef, open_source, opened_as
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
 
@@ -42,10 +42,18 @@ def reopen(ref: SourceRef) -> Dataset:
 
 
 def open_watched(ref: SourceRef) -> Dataset:
-    """Return the opened dataset. The first time, record the state of its files, too."""
+    """Return the opened dataset. The first time, record the state of its files, too.
+
+    The plan opens a source before its fingerprint is known. If no file has changed since, the same
+    dataset serves the reference with the fingerprint.
+    """
+    key = _key(ref)
+    first = _first.get(key)
+    if ref not in opened_as and first and first.location.is_local and not first.changed():
+        opened_as[ref] = key
     dataset = open_source(ref)
-    if _key(ref) not in _first:
-        _first[_key(ref)] = FileStates.look(Location.of(ref.source), dataset.files)
+    if first is None:
+        _first[key] = FileStates.look(Location.of(ref.source), dataset.files)
     return dataset
 
 
@@ -82,6 +90,7 @@ def forget() -> None:
     """Forget the state of all inputs, so that they are opened again after one has changed."""
     _first.clear()
     _tables.clear()
+    opened_as.clear()
     open_source.cache_clear()
 
 

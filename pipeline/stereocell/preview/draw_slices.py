@@ -22,7 +22,7 @@ from stereocell.filters.denoise import SMOOTHING_REACH, smooth
 from stereocell.model.mesh import Mesh
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
-from stereocell.model.volume import Volume, zyx_to_xyz
+from stereocell.model.volume import Volume, xyz_to_zyx
 from stereocell.preview.views import MICROSCOPE, View
 
 Color = tuple[int, int, int]
@@ -164,9 +164,7 @@ def cut_contour(
 
 def voxels_of(mesh: Mesh, first_um: Point, spacing_um: Spacing) -> NDArray[np.float64]:
     """Return a mesh's vertices in voxels, from the voxel at first_um: float64 (n, 3), zyx."""
-    # The world directions of z, y, x are orthonormal, so the transposed matrix inverts the mapping.
-    axes = zyx_to_xyz(np.eye(3))
-    positions = mesh.positions.astype(np.float64) @ axes.T
+    positions = xyz_to_zyx(mesh.positions.astype(np.float64))
     return (positions - np.asarray(first_um)) / np.asarray(spacing_um)
 
 

@@ -58,7 +58,7 @@ def fingerprint_of(dataset: Fingerprinted) -> str:
         for channel, box in _spread(dataset, level, budget):
             voxels = dataset.arrays[level].window(dataset.time, channel, box)
             digest.update(repr((level, channel, box.start, box.stop)).encode())
-            digest.update(voxels.astype(voxels.dtype.newbyteorder("<")).tobytes())
+            digest.update(np.ascontiguousarray(voxels, voxels.dtype.newbyteorder("<")).data)
     return digest.hexdigest()
 
 

@@ -14,12 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.image_plane import in_order
+
 
 class WholeArray:
     """Time points of one volume, (t, z, y, x); the last one that was read is cached.
 
     shape  (t, z, y, x) in voxels
-    load   returns the voxels (z, y, x) of a time point; they may be a NumPy view of a larger array
+    load   returns the voxels (z, y, x) of a time point; they may be a turned view, which is copied,
+           because each window that is read would have to be copied otherwise
     """
 
     def __init__(
@@ -41,5 +44,5 @@ class WholeArray:
         with self._lock:
             if self._held is None or self._held[0] != time:
                 self._held = None  # frees the old time point first, so that memory never holds two
-                self._held = (time, self._load(time))
+                self._held = (time, in_order(self._load(time)))
             return self._held[1][tuple(place)]

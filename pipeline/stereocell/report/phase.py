@@ -22,7 +22,7 @@ class WriteReport(Keyed):
     of detail.
     """
 
-    VERSION: ClassVar[int] = 4
+    VERSION: ClassVar[int] = 5
 
     index: Mapping[str, str]
     survey: Mapping[str, Any]

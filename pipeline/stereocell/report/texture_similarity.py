@@ -76,7 +76,7 @@ def draw(
     depth = from_middle @ to_eye
     seen = Seen.nothing((edge, edge))
     seen.add(0, places, depth, mesh.triangles)
-    pixel, triangle, weights = seen.of(0)
+    pixel, triangle, weights = seen.of(0, places, mesh.triangles)
     normals, openness = _shading(lod, triangle, weights)
     normals *= np.where(normals @ to_eye < 0, -1.0, 1.0)[:, None]  # both sides are drawn
     light = to_eye + 0.5 * right + 0.5 * up
@@ -88,7 +88,7 @@ def draw(
 
 
 def _shading(
-    lod: Lod, triangle: NDArray[np.int64], weights: NDArray[np.float64]
+    lod: Lod, triangle: NDArray[np.int32], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return unit normals (n, 3) and openness (n,), 0..1, at points of triangles.
 

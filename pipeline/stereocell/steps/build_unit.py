@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from stereocell.engine.step import Step
 from stereocell.model.unit import Unit
+from stereocell.read.decoded_chunks import forget_chunks
 from stereocell.steps.open_source import Voxels
 from stereocell.steps.unit import UnitInput, build_unit
 from stereocell.steps.unit_files import UNIT_FOLDER, UnitFolder
@@ -31,6 +32,7 @@ class BuildUnit(Step[Unit]):
         window = self.given.lattice.window
         volume = self.voxels.read(window)
         painted = None if self.painted is None else self.painted.read(window)
+        forget_chunks()  # a unit needs more memory than all passes before it
         seconds = time.perf_counter() - start
         built = build_unit(volume, self.given, painted=painted)
         return replace(built, seconds={"read": seconds, **built.seconds})

@@ -94,7 +94,7 @@ class FindWindow(Step[Window]):
     window         display window in voxel values, if the settings state it; None: it is found
     """
 
-    VERSION: ClassVar[int] = 2
+    VERSION: ClassVar[int] = 3
     FORM: ClassVar[Document[Window]] = WINDOW
 
     voxels: Voxels

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.engine.step import Document, Step
-from stereocell.filters.denoise import denoise
+from stereocell.filters.denoise import denoise_slices
 from stereocell.isosurface.axis_profiles import Profiles
 from stereocell.isosurface.edge_criteria import EdgeSums
 from stereocell.isosurface.level_evidence import (
@@ -24,7 +24,7 @@ from stereocell.isosurface.level_evidence import (
 )
 from stereocell.isosurface.neighbours import Neighbours
 from stereocell.isosurface.options import CRITERIA
-from stereocell.model.image_plane import back_of_three, first_of_three, slices_first
+from stereocell.model.image_plane import back_of_three, first_of_three, in_order, slices_first
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
@@ -37,7 +37,7 @@ def evidence_of(task: "GatherEvidence", volume: Volume, window: Box) -> TileEvid
     spacing, axis = volume.spacing_um, volume.slice_axis
     reach = denoising_reach(task.smoothing_um, spacing, axis)
     own = task.box.slices_in(window)
-    voxels = slices_first(volume.voxels, axis)
+    voxels = in_order(slices_first(volume.voxels, axis))
 
     def background(first: int, stop: int) -> NDArray[np.float32]:
         assert task.background is not None
@@ -47,7 +47,7 @@ def evidence_of(task: "GatherEvidence", volume: Volume, window: Box) -> TileEvid
         )
 
     return gather_evidence(
-        np.ascontiguousarray(slices_first(denoise(volume, task.smoothing_um), axis)),
+        denoise_slices(volume, task.smoothing_um),
         find_padding(voxels, task.counting.darkest, first_of_three(reach, axis)),
         first_of_three(own, axis),
         voxels=voxels,

@@ -61,10 +61,15 @@ class Voxels:
         return open_source(self.ref).read(self.channel, box, self.level)
 
 
+# For references with a fingerprint: the reference under which the same dataset was opened before
+opened_as: dict[SourceRef, SourceRef] = {}
+
+
 @lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
-    return open_afresh(ref)
+    other = opened_as.get(ref, ref)
+    return open_afresh(ref) if other == ref else open_source(other)
 
 
 def open_afresh(ref: SourceRef) -> read.Dataset:

@@ -44,7 +44,7 @@ class WriteStage(Keyed):
     The fields are those of `usd.write_stage`.
     """
 
-    VERSION: ClassVar[int] = 6
+    VERSION: ClassVar[int] = 7
 
     name: str
     tiles: tuple[WriteStageTile, ...]

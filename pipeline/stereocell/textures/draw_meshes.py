@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.shading import light_pixels
+from stereocell.kernels.depth_buffer import place_points
+from stereocell.kernels.shading import light_pixels, shrink, shrink_visible
 from stereocell.model.color import to_srgb8
 from stereocell.textures.rasterize import Seen
 
@@ -55,9 +56,13 @@ class _View:
 
     def place(self, points: NDArray[np.floating]) -> tuple[Vector, Vector]:
         """Return the pixels (n, 2), x right, y down, and depths (n,), larger is nearer."""
-        right, up, depth = ((points - self.centre) @ self.axes).T
         height, width = self.size
-        return np.stack([width / 2 + self.scale * right, height / 2 - self.scale * up], 1), depth
+        places, depth = np.empty((len(points), 2)), np.empty(len(points))
+        middle = np.array([width / 2, height / 2])
+        given = np.require(points, requirements=["C", "W"])
+        axes = np.ascontiguousarray(self.axes)
+        place_points(given, self.centre, axes, self.scale, middle, places, depth)
+        return places, depth
 
 
 def draw_pixels(
@@ -79,7 +84,9 @@ def draw_pixels(
     picture, nearest = _shade(shapes, view)
     for low, high in boxes:
         _outline(picture, nearest, view, np.array([low, high]))
-    mean = _shrink(picture)
+    height, width = view.size
+    mean = np.empty((height // _FINE, width // _FINE, 3))
+    shrink(picture, _FINE, mean)
     return to_srgb8(mean.astype(np.float32))
 
 
@@ -97,11 +104,10 @@ def draw_side(shapes: Iterable[Shape], box: Box, axes: Vector, longest: int) -> 
     size = (height * _FINE, width * _FINE)
     view = _View(axes, (low + high) / 2, _FINE * scale, size)
     picture, nearest = _shade(shapes, view)
-    is_hit = np.isfinite(nearest)[:, :, None].astype(np.float64)
-    cover = _shrink(is_hit)
-    light = _shrink(picture * is_hit) / np.maximum(cover, 1e-9)
+    light, cover = np.empty((height, width, 3)), np.empty((height, width))
+    shrink_visible(picture, nearest, _FINE, light, cover)
     alpha = np.rint(255 * cover).astype(np.uint8)
-    return np.concatenate([to_srgb8(light.astype(np.float32)), alpha], axis=2)
+    return np.dstack([to_srgb8(light.astype(np.float32)), alpha])
 
 
 def _shade(shapes: Iterable[Shape], view: _View) -> tuple[Vector, Vector]:
@@ -119,7 +125,6 @@ def _shade(shapes: Iterable[Shape], view: _View) -> tuple[Vector, Vector]:
             number,
             seen.mesh,
             seen.triangle,
-            seen.weights,
             np.ascontiguousarray(shape.triangles, np.uint32),
             places,
             np.ascontiguousarray(shape.normals, np.float32),
@@ -142,15 +147,6 @@ def _lamps() -> Vector:
         halfway = to_lamp + np.array([0.0, 0.0, 1.0])
         lamps.append(np.r_[to_lamp, halfway / np.linalg.norm(halfway), light])
     return np.array(lamps)
-
-
-def _shrink(drawn: Vector) -> Vector:
-    """Return the means of _FINE x _FINE pixels (h, w, channels)."""
-    parts = [drawn[down::_FINE, on::_FINE] for down in range(_FINE) for on in range(_FINE)]
-    mean: Vector = sum(parts[1:], parts[0]) / len(
-        parts
-    )  # takes a third of the time of .mean over two axes
-    return mean
 
 
 def turning_frame(low: Vector, high: Vector) -> Box:

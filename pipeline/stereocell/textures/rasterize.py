@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.kernels.depth_buffer import find_visible
+from stereocell.kernels.depth_buffer import find_visible, weigh_pixels
 
 _AT_ONCE = 1 << 20  # texels or pixels that are computed together, in about 0.2 GB
 
@@ -52,22 +52,19 @@ class Seen:
 
     nearest   float64 (height, width), depth; larger is nearer; minus infinity: nothing is visible
     mesh      int32 (height, width), number of the mesh; -1: nothing is visible
-    triangle  int64 (height, width), index of the triangle of that mesh
-    weights   float64 (height, width, 3), barycentric coordinates
-
-    `triangle` and `weights` are undefined where nothing is visible.
+    triangle  int32 (height, width), index of the triangle of that mesh; undefined where nothing is
+              visible
     """
 
     nearest: NDArray[np.float64]
     mesh: NDArray[np.int32]
-    triangle: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    triangle: NDArray[np.int32]
 
     @classmethod
     def nothing(cls, size: tuple[int, int]) -> "Seen":
         """Return an image (height, width) without a surface."""
         nearest, mesh = np.full(size, -np.inf), np.full(size, -1, np.int32)
-        return cls(nearest, mesh, np.empty(size, np.int64), np.empty((*size, 3)))
+        return cls(nearest, mesh, np.empty(size, np.int32))
 
     def add(
         self,
@@ -90,17 +87,21 @@ class Seen:
             self.nearest,
             self.mesh,
             self.triangle,
-            self.weights,
         )
 
-    def of(self, number: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    def of(
+        self, number: int, places: NDArray[np.float64], triangles: NDArray[np.uint32]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
         """Return the visible points of a mesh.
 
-        result  pixel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
+        places, triangles  as they were added
+        result  pixel int64 (k,), row * width + column; triangle int32 (k,); barycentric weights
                 float64 (k, 3)
         """
-        pixel = np.flatnonzero(self.mesh == number)
-        return pixel, self.triangle.ravel()[pixel], self.weights.reshape(-1, 3)[pixel]
+        pixel, width = np.flatnonzero(self.mesh == number), self.mesh.shape[1]
+        drawn = np.ascontiguousarray(triangles, np.uint32)
+        weights = weigh_pixels(pixel, width, self.triangle, drawn, np.ascontiguousarray(places))
+        return pixel, self.triangle.ravel()[pixel], weights
 
 
 def _cover(

@@ -40,6 +40,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.filters.codes import count_each, has_codes
 from stereocell.kernels.value_counts import count_values
 
 WINDOW_SHARE = 0.10  # length of the moving window as a share of the histogram's length
@@ -125,9 +126,14 @@ def count_in_bins(
     """
     flat, counts = voxels.reshape(-1), np.zeros(len(edges) - 1, np.int64)
     low, high = (float(end) for end in window)
+    if has_codes(voxels.dtype):
+        values, times = count_each(voxels)
+        count_values(values.astype(np.float64), times, edges, low, high, clips, counts)
+        return counts
+    once = np.ones(_AT_ONCE, np.int64)
     for start in range(0, flat.size, _AT_ONCE):
         part = flat[start : start + _AT_ONCE].astype(np.float64)
-        count_values(part, edges, low, high, clips, counts)
+        count_values(part, once, edges, low, high, clips, counts)
     return counts
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.filters.percentiles import find_percentiles
 from stereocell.model.channel import (
     LOW_CONFIDENCE,
     Appearance,
@@ -72,8 +73,8 @@ def find_statistics(
 ) -> ChannelStatistics:
     """Return the window and the histogram of a channel. A constant channel has a window of width 1.
 
-    voxels      any shape, any number type, voxel values; they are reordered in place, because the
-                peak memory of a small build would be a sorted copy
+    voxels      any shape, any number type, voxel values; they may be reordered in place, because
+                the peak memory of a small build would be a sorted copy
     background  values that a build subtracts from the voxels; None: it subtracts none
     window      lowest and highest voxel value if known; None: they are found
 
@@ -85,7 +86,7 @@ def find_statistics(
     """
     percentiles = (options.low_percentile, options.high_percentile)
     voxels = voxels.reshape(-1)
-    low, high = (float(v) for v in np.percentile(voxels, percentiles, overwrite_input=True))
+    low, high = find_percentiles(voxels, percentiles, overwrites=True)
     if not high > low:  # a sparse channel has fewer bright voxels than the percentile leaves out
         low, high = float(voxels.min()), float(voxels.max())
     if not high > low:

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.filters.codes import codes_of, every_code, has_codes
+from stereocell.kernels.value_counts import count_steps, look_up, measure_steps
 from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
@@ -36,17 +38,10 @@ def find_steps(voxels: NDArray[np.uint8], spacing_um: Spacing) -> NDArray[np.flo
     spacing_um  (z, y, x); only the ratios matter
     result      float32 (z - 2, y - 2, x - 2)
     """
-    finest = min(spacing_um)
-    inner = (slice(1, -1),) * 3
-    total = np.zeros([n - 2 for n in voxels.shape], np.float32)
-    for axis, spacing in enumerate(spacing_um):
-        after, before = ([*inner] for _ in range(2))
-        after[axis], before[axis] = slice(2, None), slice(None, -2)
-        step = np.subtract(voxels[tuple(after)], voxels[tuple(before)], dtype=np.float32)
-        step *= np.float32(finest / spacing)
-        step *= step
-        total += step
-    steps: NDArray[np.float32] = np.sqrt(total, out=total)
+    ratios = np.array([min(spacing_um) / spacing for spacing in spacing_um], np.float32)
+    z, y, x = (n - 2 for n in voxels.shape)
+    steps = np.empty((z, y, x), np.float32)
+    measure_steps(_plain(voxels), ratios, steps)
     return steps
 
 
@@ -70,15 +65,17 @@ def count_joint(
     short = [(1, 1) if n < 3 else (0, 0) for n in voxels.shape]
     voxels = np.pad(voxels, short, mode="edge") if (1, 1) in short else voxels
     factor = np.float32((rows - 1) / (255 * gradient_max))
-    counts = np.zeros(rows * COLUMNS, np.int64)
+    counts = np.zeros((rows, COLUMNS), np.int64)
     # The voxels are counted slice by slice, since slices fit into the processor's cache.
     for z in range(1, len(voxels) - 1, every):
-        steps = find_steps(voxels[z - 1 : z + 2], spacing_um)[0]
-        row = np.minimum(steps * factor + np.float32(0.5), rows - 1).astype(np.intp)
-        row *= COLUMNS
-        row += voxels[z, 1:-1, 1:-1]
-        counts += np.bincount(row.ravel(), minlength=counts.size)
-    return counts.reshape(rows, COLUMNS)
+        near = _plain(voxels[z - 1 : z + 2])
+        count_steps(find_steps(near, spacing_um)[0], near[1], factor, counts)
+    return counts
+
+
+def _plain(voxels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return voxels as kernels take them: contiguous and writable; a copy only if necessary."""
+    return np.require(voxels, np.uint8, ["C", "W"])
 
 
 def choose_gradient_max(fine: NDArray[np.int64]) -> float:
@@ -126,10 +123,13 @@ def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[
     """
     result = np.empty(voxels.shape, np.uint8)
     table = None
-    if voxels.dtype in (np.uint8, np.uint16) and voxels.size > 1 << 16:
-        table = _scaled(np.arange(np.iinfo(voxels.dtype).max + 1, dtype=voxels.dtype), window)
+    if has_codes(voxels.dtype) and voxels.ndim > 1 and voxels.size > 1 << 16:
+        table = _scaled(every_code(voxels.dtype), window)
     for z, plane in enumerate(voxels):  # one plane at a time, because float32 is large
-        result[z] = _scaled(plane, window) if table is None else table[plane]
+        if table is None:
+            result[z] = _scaled(plane, window)
+        else:
+            look_up(codes_of(plane), table, result[z].reshape(-1))
     return result
 
 

@@ -11,6 +11,7 @@ from stereocell.model.errors import SourceError
 from stereocell.read import zarr_ending  # noqa: F401  (it registers a function for Python's end)
 from stereocell.read.array_axes import given_axes
 from stereocell.read.dataset import StoredArray, VoxelArray
+from stereocell.read.decoded_chunks import DecodedChunks
 from stereocell.read.image import RGB_COLORS, RGB_NAMES, Color
 
 _RGB, _PALETTE, WHITE_IS_ZERO = 2, 3, 0  # values of the TIFF tag PhotometricInterpretation
@@ -22,7 +23,9 @@ def array_of(series: TiffPageSeries, level: int) -> VoxelArray:
     # tifffile's store is Zarr v3 from 2026.5 on and v2 before; each names the axes differently.
     names: Any = getattr(array.metadata, "dimension_names", None)
     names = names or array.attrs["_ARRAY_DIMENSIONS"]
-    return VoxelArray(array, tuple(str(name).lower().rstrip("0123456789") for name in names))
+    return VoxelArray(
+        DecodedChunks(array), tuple(str(name).lower().rstrip("0123456789") for name in names)
+    )
 
 
 class FirstAlong:
