@@ -221,6 +221,7 @@ export class TileMarch {
     uniforms.uIndex.value = shown.index;
     this.define("STREAM_BRICK", shown.index === null ? null : STREAM_BRICK);
     uniforms.uFresh.value = fresh;
+    this.define("FADES", old !== null && fresh < 1 ? 1 : null);
     uniforms.uPresence.value = presence;
     this.skips.sync(shown, old);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;

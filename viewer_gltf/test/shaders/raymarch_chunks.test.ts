@@ -358,7 +358,8 @@ describeInChromium("the shader chunks", () => {
     const sample = (at: readonly number[], fresh: number) =>
       run(
         ["sample_intensities"],
-        `uniform sampler3D uVolume; uniform sampler3D uOldVolume;
+        `${fresh < 1 ? "#define FADES" : ""}
+         uniform sampler3D uVolume; uniform sampler3D uOldVolume;
          const float uFresh = ${fresh.toFixed(3)};`,
         // the centres of voxels lie at 1/4 and 3/4
         `oColor = 255.0 * sampleIntensities(${vec(...at.map((v) => 0.25 + v / 2))});`,
@@ -529,9 +530,8 @@ describeInChromium("the shader chunks", () => {
       const uVolume: Texture = { size: [8, 8, 4], channels: 1, texels, isLinear: true };
       const light = unit([-1, 1, 1]);
       const head = `uniform sampler3D uVolume;
-        const float uFresh = 1.0; const float uVoxel = 1.0; const vec3 vLight = ${vec(...light)};
-        ${lights(DIFFUSE, AMBIENT)}
-        #define uOldVolume uVolume`;
+        const float uVoxel = 1.0; const vec3 vLight = ${vec(...light)};
+        ${lights(DIFFUSE, AMBIENT)}`;
       // voxels of 1 um; rows run against y
       const perUm = vec(1 / 8, -1 / 8, 1 / 4);
       const shares = "vec4(1.0, 0.0, 0.0, 0.0)";
@@ -660,8 +660,8 @@ describeInChromium("the shader chunks", () => {
         ["skip_empty_bricks"],
         `uniform sampler3D uOccupancy; const float uVoxel = 1.0;
          const float uBrickSlack = ${slack.toFixed(1)};`,
-        `vec3 dir = vec3(1.0, 1e-9, 1e-9);
-         oColor = blockAhead(vec3(${start.toFixed(2)}, 0.5, 0.5), dir, 1.0 / dir, 0.0).xyxy;`,
+        `BrickRay ray = brickRay(vec3(${start.toFixed(2)}, 0.5, 0.5), vec3(1.0, 1e-9, 1e-9));
+         oColor = blockAhead(ray, 0.0).xyxy;`,
         { uOccupancy },
       );
     // Two bricks before the visible one, which is brick 7. Near it, all values may be blurred.
