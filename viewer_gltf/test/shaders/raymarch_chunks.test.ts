@@ -3,6 +3,7 @@
  * weight of the disc, and how a sample is read, lit and shifted.
  */
 import { readdir, readFile } from "node:fs/promises";
+import { DataUtils } from "three";
 import { describe, expect, it } from "vitest";
 import { blueNoise, NOISE_SIZE } from "../../src/gpu/blue_noise";
 import { toHex } from "../../src/math/color";
@@ -769,6 +770,22 @@ describeInChromium("the shader chunks", () => {
     expect(await left(1, false, true)).toEqual([1, 0]); // mixed with the volume's image
     expect(await left(1, true, false)).toEqual([1, 1]);
     expect(await left(1, true, false, 5)).toEqual([0, 0]); // outside the disc
+  });
+
+  it("know what a rough surface reflects about as well as three.js's table", async () => {
+    // @ts-expect-error three.js has no types for this file
+    const { getDFGLUT } = await import("three/src/renderers/shaders/DFGLUTData.js");
+    const { width, height, data } = getDFGLUT().image;
+    // the table's entries lie at the middles of its cells
+    for (let i = width / 2; i < width; i++) {
+      for (let j = 0; j < height; j += 3) {
+        const at = vec((i + 0.5) / width, (j + 0.5) / height);
+        const found = await run(["reflected_share"], "", `oColor = reflectedShare(${at}).xyxy;`);
+        const entry = [0, 1].map((k) => DataUtils.fromHalfFloat(data[2 * (j * width + i) + k]));
+        expect(Math.abs(found[0] - entry[0]), at).toBeLessThan(0.045);
+        expect(Math.abs(found[1] - entry[1]), at).toBeLessThan(0.011);
+      }
+    }
   });
 
   it("are all tested", async () => {
