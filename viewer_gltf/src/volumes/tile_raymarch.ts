@@ -227,6 +227,11 @@ export class TileMarch {
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
   }
 
+  /** Sets whether depth shading takes light away. */
+  setShaded(isShaded: boolean): void {
+    this.define("SHADED", isShaded ? 1 : null);
+  }
+
   /** Restricts the march to the disc's cone, for all channels. */
   endAtDisc(ends: boolean): void {
     this.mesh.material.uniforms.uAllInDisc.value = ends || this.tables.isInDisc;

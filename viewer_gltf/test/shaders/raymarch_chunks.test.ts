@@ -414,7 +414,7 @@ describeInChromium("the shader chunks", () => {
           return vec4(0.5 + v, 0.5 - v, 0.5 + v, 0.0);
         }`;
       const shares = "vec4(0.25, 0.0, 0.75, 0.0)"; // the second channel has no weight
-      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${vec(...perUm)}, ${shares}), ${vec(...unit(dir))}, vec3(0.0))`;
+      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${vec(...perUm)}, ${shares}), lightAlong(${vec(...unit(dir))}), vec3(0.0))`;
       const body = `oColor = vec4(${call}, 1.0);`;
       return run(["gradient", "shade"], head, body).then(([found]) => found);
     }
@@ -482,7 +482,7 @@ describeInChromium("the shader chunks", () => {
           vec4 sampleIntensities(vec3 p) { return vec4(0.0); }`;
         // a boundary that faces lamp and eye, and a place without a boundary
         const call = (slope: string) =>
-          `shadeBy(vec3(1.0), vec3(0.0, 0.0, ${slope}), vec3(0.0, 0.0, -1.0), vec3(0.0)).r`;
+          `shadeBy(vec3(1.0), vec3(0.0, 0.0, ${slope}), lightAlong(vec3(0.0, 0.0, -1.0)), vec3(0.0)).r`;
         const body = `oColor = vec4(${call("-0.5")}, ${call("0.0")}, 0.0, 1.0);`;
         return (await run(["gradient", "shade"], head, body)).slice(0, 2);
       };
@@ -508,7 +508,8 @@ describeInChromium("the shader chunks", () => {
         isLinear: true,
       };
       const reached = async (x: number, outwards: string, strength: number) => {
-        const head = `uniform sampler3D uReached; const float uShadingCell = 2.0;
+        const head = `#define SHADED
+          uniform sampler3D uReached; const float uShadingCell = 2.0;
           const mat4 uToShading = mat4(0.125, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0,
                                        0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
           const float uDepthShading = ${strength.toFixed(2)};`;
@@ -536,7 +537,7 @@ describeInChromium("the shader chunks", () => {
       // voxels of 1 um; rows run against y
       const perUm = vec(1 / 8, -1 / 8, 1 / 4);
       const shares = "vec4(1.0, 0.0, 0.0, 0.0)";
-      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${perUm}, ${shares}), vec3(0.6, -0.8, 0.0), vec3(0.0))`;
+      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${perUm}, ${shares}), lightAlong(vec3(0.6, -0.8, 0.0)), vec3(0.0))`;
       const textures = { uVolume };
       const [found] = await run(
         ["sample_intensities", "gradient", "shade"],

@@ -194,15 +194,17 @@ void main() {
   vec4 front = vec4(0.0);  // the sum in front of the pane
   bool isBehind = false;
   float shift = jitter(gl_FragCoord.xy - uPart.xy);
+#ifndef UNLIT
+  RayLight rayLight = lightAlong(dir);
+#endif
   vec3 face = span.x > 0.0 ? cutFace(start) : vec3(0.0);
 #ifdef SUM
   vec3 across = uAllHigh - uAllLow;
   float light = SUM_LIGHT * uVoxel / pow(across.x * across.y * across.z, 1.0 / 3.0);
 #endif
-#ifdef DISC
-  float density = uDensity / uVoxel;
-#else
-  float density = uDensity / uVoxel * uPresence;
+  float density = uDensity / uVoxel;  // per um
+#ifndef DISC
+  density *= uPresence;
 #endif
   float t = 0.0;
   float exit = 0.0;  // t up to which the bricks were looked up
@@ -269,7 +271,7 @@ void main() {
           if (!isCut && (1.0 - sum.a) * s.a >= FAINT) {
             gradient = gradientAt(p, texPerUm, uContrast * shares);
           }
-          s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
+          s.rgb = shadeBy(s.rgb, gradient, rayLight, start + at * dir);
 #endif
           sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
         }
