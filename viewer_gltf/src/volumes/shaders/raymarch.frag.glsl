@@ -266,7 +266,7 @@ void main() {
 #else
         if (s.a > 0.0) {
 #ifndef UNLIT  // for the benchmark, which times other programs without lighting
-          bool isCut = t < uVoxel && face != vec3(0.0);
+          bool isCut = t < 0.5 * uVoxel && face != vec3(0.0);  // the first step
           vec3 gradient = isCut ? -face : vec3(0.0);
           if (!isCut && (1.0 - sum.a) * s.a >= FAINT) {
             gradient = gradientAt(p, texPerUm, uContrast * shares);
