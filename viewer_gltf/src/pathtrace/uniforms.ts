@@ -60,8 +60,6 @@ export function traceUniforms(uSceneDepth: { value: Texture }, mostHistory: numb
     uTexels: { value: new Vector3(1, 1, 1) },
     uVolume: nothing(),
     uIndex: nothing(),
-    uOldVolume: nothing(),
-    uFresh: { value: 1 },
     uMedium: nothing(),
     ...tableUniforms(),
     uMajorants: nothing(),
@@ -112,7 +110,7 @@ export function boxToWorld({ matrix, min }: BlockFrame): Matrix4 {
  * the texture.
  */
 export function texelsInto(uniforms: TraceUniforms, { frame, texture, index, size }: MediumTexels) {
-  uniforms.uVolume.value = uniforms.uOldVolume.value = texture;
+  uniforms.uVolume.value = texture;
   uniforms.uIndex.value = index;
   uniforms.uTexels.value.set(...size);
   const edges = frame.max.map((v, k) => v - frame.min[k]);

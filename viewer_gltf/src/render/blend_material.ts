@@ -32,7 +32,7 @@ import vertexInsertions from "./insertions/surface.vert.glsl?raw";
 import surfaceFragment from "./shaders/surface.frag.glsl?raw";
 import depthFragment from "./shaders/surface_depth.frag.glsl?raw";
 import depthVertex from "./shaders/surface_depth.vert.glsl?raw";
-import { defineNeeds } from "./surface_needs";
+import { defineNeeds, defineRough } from "./surface_needs";
 
 /**
  * Uniforms that all surfaces share: the disc's cone and the clip planes in the scene, metres, and
@@ -185,6 +185,7 @@ export class BlendedSurface {
     };
     for (const material of materials) {
       this.patch(material);
+      defineRough(material);
       both.adopt(material);
       defineNeeds(material, uniforms);
       material.forceSinglePass = true; // the depth pass already sorts front and back

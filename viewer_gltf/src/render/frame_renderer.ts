@@ -18,6 +18,7 @@ import { LAST, Overlay } from "../gpu/composite_pass";
 import { EncodePass } from "../gpu/encode_pass";
 import { Eyes } from "../gpu/eyes";
 import { drawWhole } from "../gpu/float_targets";
+import { hasEdges } from "../gpu/has_edges";
 import { linearTarget } from "../gpu/linear_target";
 import type { Clip } from "../math/clip";
 import { lightByScene, makeFrame, REST_STEPS } from "../voxels/march_frame";
@@ -94,7 +95,10 @@ export class FrameRenderer {
   };
   /** Target of the whole frame in linear light, before it is encoded. */
   private readonly light: WebGLRenderTarget;
-  /** Target of a frame in linear light without anti-aliasing, for moving views that are late. */
+  /**
+   * Target of a frame in linear light without anti-aliasing, for moving views that are late and for
+   * frames without edges.
+   */
   private readonly draft: WebGLRenderTarget;
   private readonly encode = new EncodePass();
   /** Fades from the frame before a jump to the frame after it. */
@@ -216,7 +220,8 @@ export class FrameRenderer {
       tracer.render(renderer, this.eyes, scene, { resolution, isMoving, passes, standIn });
       if (tracer.isOnScreen) this.march.hide();
     }
-    this.show(isSmooth ? this.light : this.draft, isMixed);
+    const isSmoothed = isSmooth && hasEdges(specimenScene.scene);
+    this.show(isSmoothed ? this.light : this.draft, isMixed);
   }
 
   /** Whether the user's own room is visible behind the specimen. */

@@ -1,8 +1,8 @@
-import { Matrix4, MeshStandardMaterial } from "three";
+import { Matrix4, MeshStandardMaterial, Texture } from "three";
 import { beforeEach, describe, expect, it } from "vitest";
 import { Cuts } from "../gpu/clip_planes";
 import type { Clip } from "../math/clip";
-import { defineNeeds } from "./surface_needs";
+import { defineNeeds, defineRough } from "./surface_needs";
 
 const NO_CUT: Clip = { box: null, plane: null };
 const CORNER = [0, 1, 2].map((k) => ({
@@ -67,4 +67,18 @@ describe("a surface's shader", () => {
     expect(after).toBeGreaterThan(before);
     expect(drawn()[1]).toBe(after);
   });
+
+  for (const [name, parameters, isRough] of [
+    ["of roughness 0.5", { roughness: 0.5 }, true],
+    ["with some gloss", { roughness: 0.49 }, false],
+    ["of metal", { roughness: 0.5, metalness: 0.1 }, false],
+    ["whose roughness varies", { roughnessMap: new Texture() }, false],
+  ] as const) {
+    it(`${isRough ? "needs no" : "needs a"} table of reflected light ${name}`, () => {
+      const surface = new MeshStandardMaterial(parameters);
+      defineRough(surface);
+      expect("ROUGH" in (surface.defines ?? {})).toBe(isRough);
+      expect("STANDARD" in (surface.defines ?? {})).toBe(true);
+    });
+  }
 });

@@ -7,8 +7,10 @@
  * - BOTH_EYES: two eyes see the frame, and fragments can reach into the other eye's part.
  * - CUT: clip planes or slices remove parts of surfaces.
  * - OPEN: a tile is drawn as a volume, and its neighbours' surfaces end at its faces.
+ * - ROUGH: the surface is rough and no metal, so a polynomial replaces three.js's table of reflected
+ *   light.
  */
-import type { Material, Vector4 } from "three";
+import type { Material, MeshStandardMaterial, Vector4 } from "three";
 import type { BothEyesUniforms } from "../gpu/both_eyes";
 import type { Cuts } from "../gpu/clip_planes";
 import { CORNER_PLANES } from "../gpu/clip_uniforms";
@@ -25,6 +27,17 @@ function needs({ uCuts, uCutCount, uOpen, uIsForBoth }: NeededBy): Record<Need, 
     CUT: uCutCount.value > 0 || corner.every(isThere),
     OPEN: uOpen.value.some(isThere),
   };
+}
+
+/** Least roughness for which the polynomial in chunks/reflected_share holds. */
+const ROUGH = 0.5;
+
+/** Sets the define of a rough material. Roughness and metalness must not change afterwards. */
+export function defineRough(material: MeshStandardMaterial): void {
+  const { roughness, metalness, roughnessMap, metalnessMap } = material;
+  const isPlain = roughnessMap === null && metalnessMap === null;
+  if (!isPlain || roughness < ROUGH || metalness > 0) return;
+  material.defines = { ...material.defines, ROUGH: "" };
 }
 
 /**

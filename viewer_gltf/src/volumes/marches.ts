@@ -212,6 +212,7 @@ export class Marches implements DrawnMarches {
     this.frame.uDensity.value = state !== null && isTraced(state) ? state.trace.density : 1;
     for (const { march } of drawn) {
       this.shading.place(march);
+      march.setShaded(this.frame.uDepthShading.value > 0);
       march.sortBy(eye);
       march.aim(apex, axis);
       march.clip(clip);

@@ -36,8 +36,11 @@ import { occupiedCorners } from "./occupied_bricks";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 import { SkipTables } from "./skip_tables";
 
-/** Shortest step along a ray, in voxels. */
-const STEP_VOXELS = 1;
+/**
+ * Shortest step along a ray, in voxels. At one voxel, the opacity of nuclei has 46.6 dB beside the
+ * float64 reference, and 46.9 to 47.2 dB in other programs. At 0.9 it has 47.5.
+ */
+const STEP_VOXELS = 0.9;
 /** Opacity, 0 to 1, at which a ray ends. */
 const OPAQUE = 0.99;
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
@@ -221,9 +224,15 @@ export class TileMarch {
     uniforms.uIndex.value = shown.index;
     this.define("STREAM_BRICK", shown.index === null ? null : STREAM_BRICK);
     uniforms.uFresh.value = fresh;
+    this.define("FADES", old !== null && fresh < 1 ? 1 : null);
     uniforms.uPresence.value = presence;
     this.skips.sync(shown, old);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
+  }
+
+  /** Sets whether depth shading takes light away. */
+  setShaded(isShaded: boolean): void {
+    this.define("SHADED", isShaded ? 1 : null);
   }
 
   /** Restricts the march to the disc's cone, for all channels. */

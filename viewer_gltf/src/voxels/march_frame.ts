@@ -21,7 +21,7 @@ import { GLOSS, OWN_LIGHT, type SceneLight } from "../gpu/scene_light";
  * tiles.
  */
 export const MAX_STEPS = 100;
-/** Largest number of steps of a ray at rest: one step per voxel through 512 voxels. */
+/** Largest number of steps of a ray at rest: at most a voxel long through 512 voxels. */
 export const REST_STEPS = 512;
 /** The light on all tiles; see gpu/chunks/shade.glsl. Directions are in the eye's axes. */
 export type MarchLight = ReturnType<typeof marchLight>;

@@ -194,9 +194,9 @@ describeInChromium("the ray march", () => {
           bare.page,
           chunks,
           head,
-          `vec3 dir = vec3(${dir.toFixed(3)}, 1e-9, 1e-9);
-           oColor = blockAhead(vec3(${start.toFixed(3)}, 0.5, 0.5), dir, 1.0 / dir,
-                               ${t.toFixed(3)}).xyxy;`,
+          `BrickRay ray = brickRay(vec3(${start.toFixed(3)}, 0.5, 0.5),
+                                   vec3(${dir.toFixed(3)}, 1e-9, 1e-9));
+           oColor = blockAhead(ray, ${t.toFixed(3)}).xyxy;`,
           { uOccupancy: { ...uOccupancy, texels: [...uOccupancy.texels] } },
         )
       ).slice(0, 2);

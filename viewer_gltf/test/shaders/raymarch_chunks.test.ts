@@ -3,6 +3,7 @@
  * weight of the disc, and how a sample is read, lit and shifted.
  */
 import { readdir, readFile } from "node:fs/promises";
+import { DataUtils } from "three";
 import { describe, expect, it } from "vitest";
 import { blueNoise, NOISE_SIZE } from "../../src/gpu/blue_noise";
 import { toHex } from "../../src/math/color";
@@ -358,7 +359,8 @@ describeInChromium("the shader chunks", () => {
     const sample = (at: readonly number[], fresh: number) =>
       run(
         ["sample_intensities"],
-        `uniform sampler3D uVolume; uniform sampler3D uOldVolume;
+        `${fresh < 1 ? "#define FADES" : ""}
+         uniform sampler3D uVolume; uniform sampler3D uOldVolume;
          const float uFresh = ${fresh.toFixed(3)};`,
         // the centres of voxels lie at 1/4 and 3/4
         `oColor = 255.0 * sampleIntensities(${vec(...at.map((v) => 0.25 + v / 2))});`,
@@ -412,7 +414,7 @@ describeInChromium("the shader chunks", () => {
           return vec4(0.5 + v, 0.5 - v, 0.5 + v, 0.0);
         }`;
       const shares = "vec4(0.25, 0.0, 0.75, 0.0)"; // the second channel has no weight
-      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${vec(...perUm)}, ${shares}), ${vec(...unit(dir))}, vec3(0.0))`;
+      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${vec(...perUm)}, ${shares}), lightAlong(${vec(...unit(dir))}), vec3(0.0))`;
       const body = `oColor = vec4(${call}, 1.0);`;
       return run(["gradient", "shade"], head, body).then(([found]) => found);
     }
@@ -480,7 +482,7 @@ describeInChromium("the shader chunks", () => {
           vec4 sampleIntensities(vec3 p) { return vec4(0.0); }`;
         // a boundary that faces lamp and eye, and a place without a boundary
         const call = (slope: string) =>
-          `shadeBy(vec3(1.0), vec3(0.0, 0.0, ${slope}), vec3(0.0, 0.0, -1.0), vec3(0.0)).r`;
+          `shadeBy(vec3(1.0), vec3(0.0, 0.0, ${slope}), lightAlong(vec3(0.0, 0.0, -1.0)), vec3(0.0)).r`;
         const body = `oColor = vec4(${call("-0.5")}, ${call("0.0")}, 0.0, 1.0);`;
         return (await run(["gradient", "shade"], head, body)).slice(0, 2);
       };
@@ -506,7 +508,8 @@ describeInChromium("the shader chunks", () => {
         isLinear: true,
       };
       const reached = async (x: number, outwards: string, strength: number) => {
-        const head = `uniform sampler3D uReached; const float uShadingCell = 2.0;
+        const head = `#define SHADED
+          uniform sampler3D uReached; const float uShadingCell = 2.0;
           const mat4 uToShading = mat4(0.125, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0,
                                        0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
           const float uDepthShading = ${strength.toFixed(2)};`;
@@ -529,13 +532,12 @@ describeInChromium("the shader chunks", () => {
       const uVolume: Texture = { size: [8, 8, 4], channels: 1, texels, isLinear: true };
       const light = unit([-1, 1, 1]);
       const head = `uniform sampler3D uVolume;
-        const float uFresh = 1.0; const float uVoxel = 1.0; const vec3 vLight = ${vec(...light)};
-        ${lights(DIFFUSE, AMBIENT)}
-        #define uOldVolume uVolume`;
+        const float uVoxel = 1.0; const vec3 vLight = ${vec(...light)};
+        ${lights(DIFFUSE, AMBIENT)}`;
       // voxels of 1 um; rows run against y
       const perUm = vec(1 / 8, -1 / 8, 1 / 4);
       const shares = "vec4(1.0, 0.0, 0.0, 0.0)";
-      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${perUm}, ${shares}), vec3(0.6, -0.8, 0.0), vec3(0.0))`;
+      const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${perUm}, ${shares}), lightAlong(vec3(0.6, -0.8, 0.0)), vec3(0.0))`;
       const textures = { uVolume };
       const [found] = await run(
         ["sample_intensities", "gradient", "shade"],
@@ -660,8 +662,8 @@ describeInChromium("the shader chunks", () => {
         ["skip_empty_bricks"],
         `uniform sampler3D uOccupancy; const float uVoxel = 1.0;
          const float uBrickSlack = ${slack.toFixed(1)};`,
-        `vec3 dir = vec3(1.0, 1e-9, 1e-9);
-         oColor = blockAhead(vec3(${start.toFixed(2)}, 0.5, 0.5), dir, 1.0 / dir, 0.0).xyxy;`,
+        `BrickRay ray = brickRay(vec3(${start.toFixed(2)}, 0.5, 0.5), vec3(1.0, 1e-9, 1e-9));
+         oColor = blockAhead(ray, 0.0).xyxy;`,
         { uOccupancy },
       );
     // Two bricks before the visible one, which is brick 7. Near it, all values may be blurred.
@@ -769,6 +771,22 @@ describeInChromium("the shader chunks", () => {
     expect(await left(1, false, true)).toEqual([1, 0]); // mixed with the volume's image
     expect(await left(1, true, false)).toEqual([1, 1]);
     expect(await left(1, true, false, 5)).toEqual([0, 0]); // outside the disc
+  });
+
+  it("know what a rough surface reflects about as well as three.js's table", async () => {
+    // @ts-expect-error three.js has no types for this file
+    const { getDFGLUT } = await import("three/src/renderers/shaders/DFGLUTData.js");
+    const { width, height, data } = getDFGLUT().image;
+    // the table's entries lie at the middles of its cells
+    for (let i = width / 2; i < width; i++) {
+      for (let j = 0; j < height; j += 3) {
+        const at = vec((i + 0.5) / width, (j + 0.5) / height);
+        const found = await run(["reflected_share"], "", `oColor = reflectedShare(${at}).xyxy;`);
+        const entry = [0, 1].map((k) => DataUtils.fromHalfFloat(data[2 * (j * width + i) + k]));
+        expect(Math.abs(found[0] - entry[0]), at).toBeLessThan(0.045);
+        expect(Math.abs(found[1] - entry[1]), at).toBeLessThan(0.011);
+      }
+    }
   });
 
   it("are all tested", async () => {

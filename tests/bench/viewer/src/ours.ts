@@ -29,7 +29,8 @@ class Ours implements Renderer {
   private readonly depth = new DepthPass(new Cuts());
   private readonly frame = makeFrame(this.depth.texture);
   private readonly pass = new MarchPass(this.renderer, this.frame);
-  private readonly light = linearTarget(this.renderer, { hasDepth: true, isMultisampled: true });
+  /** Not multisampled, because volumes have no edges: see viewer/gpu/has_edges. */
+  private readonly light = linearTarget(this.renderer, { hasDepth: true });
   private readonly encode = new EncodePass();
   private readonly eyes = new Eyes();
   private readonly camera = new PerspectiveCamera();

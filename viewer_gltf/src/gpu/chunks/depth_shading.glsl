@@ -7,7 +7,10 @@
 const float LIFT = 1.1;
 
 vec2 reached(vec3 um, vec3 outwards) {
-  if (uDepthShading <= 0.0) return vec2(1.0);
+#ifdef SHADED
   vec3 p = (uToShading * vec4(um + uShadingCell * outwards, 1.0)).xyz;
-  return mix(vec2(1.0), LIFT * texture(uReached, p).rg, uDepthShading);
+  return mix(vec2(1.0), LIFT * textureLod(uReached, p, 0.0).rg, uDepthShading);
+#else
+  return vec2(1.0);
+#endif
 }

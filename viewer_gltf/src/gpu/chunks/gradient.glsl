@@ -1,3 +1,13 @@
+// Sum of the channels' intensities at a texture coordinate, weighted by their shares.
+float weightedSum(vec3 p, vec4 shares) {
+#ifdef CHANNELS
+#if CHANNELS == 1
+  return sampleIntensities(p).x * shares.x;
+#endif
+#endif
+  return dot(sampleIntensities(p), shares);
+}
+
 // Gradient of the intensities, each channel weighted by its share. It is the difference, over two
 // voxels, between mean values at the corners of a cube, in the box's directions. Six samples on the
 // axes would follow every terrace of a sharp edge, and have twice the noise. The point `p` is a
@@ -5,9 +15,12 @@
 vec3 gradientAt(vec3 p, vec3 texPerUm, vec4 shares) {
   vec3 h = uVoxel * abs(texPerUm);
   vec3 gradient = vec3(0.0);
-  for (int corner = 0; corner < 8; corner++) {
-    vec3 side = 2.0 * vec3(corner & 1, (corner >> 1) & 1, corner >> 2) - 1.0;
-    gradient += side * dot(sampleIntensities(p + side * h), shares);
+  for (int edge = 0; edge < 4; edge++) {  // the cube's edges along x
+    vec2 side = vec2(2 * (edge & 1) - 1, (edge & 2) - 1);
+    vec3 middle = p + vec3(0.0, side * h.yz);
+    float low = weightedSum(vec3(middle.x - h.x, middle.yz), shares);
+    float high = weightedSum(vec3(middle.x + h.x, middle.yz), shares);
+    gradient += vec3(high - low, side * (low + high));
   }
   return 0.25 * gradient * sign(texPerUm);
 }

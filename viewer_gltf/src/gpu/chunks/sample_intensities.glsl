@@ -24,9 +24,13 @@ vec4 sampleIntensities(vec3 p) {
   return v;
 }
 #else
-// Intensity of each channel, 0 to 1, at a texture coordinate.
+// Intensity of each channel, 0 to 1, at a texture coordinate. A software renderer reads both textures
+// on both sides of a branch, so the old one is left out while nothing fades in.
 vec4 sampleIntensities(vec3 p) {
-  vec4 v = texture(uVolume, p);
-  return uFresh < 1.0 ? mix(texture(uOldVolume, p), v, uFresh) : v;
+#ifdef FADES
+  return mix(textureLod(uOldVolume, p, 0.0), textureLod(uVolume, p, 0.0), uFresh);
+#else
+  return textureLod(uVolume, p, 0.0);
+#endif
 }
 #endif

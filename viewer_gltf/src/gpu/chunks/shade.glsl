@@ -14,28 +14,41 @@ const float FLAT_STEP = 1e-4;  // less than one step of 8 bits: no direction at 
 // surfaces.
 const float SCATTERED = 1.2;
 
-vec3 lightOn(vec3 normal, vec2 reaches) {
+vec3 lightAround(vec3 normal) {
   vec3 around = mix(uGroundLight, uSkyLight, 0.5 + 0.5 * dot(normal, vUp));
-  around += uFillLight * max(dot(normal, vFill), 0.0);
-  return reaches.y * uKeyLight * max(dot(normal, vLight), 0.0) + reaches.x * around;
+  return around + uFillLight * max(dot(normal, vFill), 0.0);
+}
+
+// All about the light that stays the same along a ray. A software renderer would compute it again
+// for each sample.
+struct RayLight {
+  vec3 dir;
+  vec3 halfway;  // between the directions to the lamp and to the eye
+  vec3 key;  // light of the lamp on matter without a boundary, as if it faced the eye
+  vec3 around;  // the same of all other light
+};
+
+RayLight lightAlong(vec3 dir) {
+  vec3 key = SCATTERED * uKeyLight * max(dot(-dir, vLight), 0.0);
+  return RayLight(dir, normalize(vLight - dir), key, SCATTERED * lightAround(-dir));
 }
 
 // Diffuse light by the gradient (Levoy 1988), and a highlight of the key light (Blinn 1977,
 // exponent 16). Where the gradient is zero or only noise, matter is lit as if it faced the eye.
 // `um`: the place in the box.
-vec3 shadeBy(vec3 color, vec3 gradient, vec3 dir, vec3 um) {
+vec3 shadeBy(vec3 color, vec3 gradient, RayLight ray, vec3 um) {
   float steepness = length(gradient);
   float lit = smoothstep(NOISE_STEP, BOUNDARY_STEP, steepness);
   vec3 normal = -gradient / max(steepness, FLAT_STEP);
-  if (dot(normal, dir) > 0.0) normal = -normal;
-  vec2 reaches = reached(um, mix(-dir, normal, lit));
-  vec3 unlit = SCATTERED * color * lightOn(-dir, reaches);
-  if (steepness < FLAT_STEP) return unlit;
-  float gloss = max(dot(normal, normalize(vLight - dir)), 0.0);
+  if (dot(normal, ray.dir) > 0.0) normal = -normal;
+  vec2 reaches = reached(um, mix(-ray.dir, normal, lit));
+  vec3 unlit = color * (reaches.y * ray.key + reaches.x * ray.around);
+  float gloss = max(dot(normal, ray.halfway), 0.0);
   gloss *= gloss;
   gloss *= gloss;
   gloss *= gloss;
   gloss *= gloss;
-  vec3 facing = color * lightOn(normal, reaches) + reaches.y * uGloss * gloss * uKeyLight;
-  return mix(unlit, facing, lit);
+  vec3 key = reaches.y * uKeyLight;
+  vec3 diffuse = key * max(dot(normal, vLight), 0.0) + reaches.x * lightAround(normal);
+  return mix(unlit, color * diffuse + uGloss * gloss * key, lit);
 }

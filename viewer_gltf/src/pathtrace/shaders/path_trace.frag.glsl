@@ -13,8 +13,6 @@ uniform float uVoxel;  // um: finest voxel spacing
 uniform vec3 uTexels;  // size of the traced block, texels
 uniform sampler3D uVolume;
 uniform usampler3D uIndex;  // only with STREAM_BRICK: slot and level of each cell's brick
-uniform sampler3D uOldVolume;  // always equal to uVolume, because nothing fades in
-uniform float uFresh;
 uniform sampler2D uMedium;  // 256 x CHANNELS: albedo, extinction per um; TWO_D: 64 rows each, by gradient
 uniform sampler3D uMajorants;  // largest extinction per um in each brick
 uniform vec3 uBrick;  // texels along a brick's edges

@@ -21,6 +21,20 @@
 	if (!gl_FrontFacing) normal = insideNormal(normal, cameraPosition);
 #endif
 
+// The scene has no environment that surfaces could mirror.
+#insert before <lights_fragment_begin>
+#undef RE_IndirectSpecular
+#ifdef ROUGH
+#undef texture2D
+#define texture2D(table, at) vec4(reflectedShare(at), 0.0, 0.0)
+#endif
+
+#insert after <lights_fragment_begin>
+#ifdef ROUGH
+#undef texture2D
+#define texture2D texture
+#endif
+
 #insert before <dithering_fragment>
 #ifndef OPAQUE
 	gl_FragColor = blended(gl_FragColor, diffuseColor.a);

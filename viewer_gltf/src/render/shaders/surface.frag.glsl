@@ -7,6 +7,9 @@ varying vec3 vScene;
 #include <chunks/focus_disc>
 #include <chunks/surface_share>
 #include <chunks/marched_light>
+#ifdef ROUGH
+#include <chunks/reflected_share>
+#endif
 
 // Where a solid is cut open, or ends at the open tile, its inside is drawn flat, with the normal of
 // the section.

@@ -136,6 +136,15 @@ vec4 brightest(vec4 largest) {
 }
 #endif
 
+// Whether any channel shows something of this intensity.
+bool isVisible(vec4 intensity) {
+#if CHANNELS == 1
+  return intensity.x > uFloor.x;
+#else
+  return any(greaterThan(intensity, uFloor));
+#endif
+}
+
 // A ray that ended early is made opaque: the skipped part behind counts as equal to the part in
 // front.
 vec4 shown(vec4 sum) {
@@ -174,10 +183,7 @@ void main() {
   vec3 texPerUm = (uTexHigh - uTexLow) / uSize;
   vec3 texStart = uTexLow + start * texPerUm;
   vec3 texDir = dir * texPerUm;
-  vec3 brickStart = texStart * uSkipScale + uSkipShift;  // the same ray, in units of bricks
-  vec3 brickDir = texDir * uSkipScale;
-  brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
-  vec3 invBrickDir = 1.0 / brickDir;
+  BrickRay bricks = brickRay(texStart * uSkipScale + uSkipShift, texDir * uSkipScale);
 #ifdef MAXIMUM
   vec4 largest = vec4(0.0);  // largest intensity of each channel along the ray
 #endif
@@ -188,10 +194,17 @@ void main() {
   vec4 front = vec4(0.0);  // the sum in front of the pane
   bool isBehind = false;
   float shift = jitter(gl_FragCoord.xy - uPart.xy);
+#ifndef UNLIT
+  RayLight rayLight = lightAlong(dir);
+#endif
   vec3 face = span.x > 0.0 ? cutFace(start) : vec3(0.0);
 #ifdef SUM
   vec3 across = uAllHigh - uAllLow;
   float light = SUM_LIGHT * uVoxel / pow(across.x * across.y * across.z, 1.0 / 3.0);
+#endif
+  float density = uDensity / uVoxel;  // per um
+#ifndef DISC
+  density *= uPresence;
 #endif
   float t = 0.0;
   float exit = 0.0;  // t up to which the bricks were looked up
@@ -210,30 +223,33 @@ void main() {
     float stop = min(isPast ? end : edge, pane);
     float brink = stop - slack;
     while (t < brink) {
+      float here = min(stop - t, dt);  // the last step may be shorter
+      float at = t + shift * here;
       // Skipping has a separate loop, so that neighbouring rays sample together, however much they
       // skipped.
-      while (t >= exit) {
-        vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
-        // The ray skips whole steps, so that samples lie where they would lie without skipping.
-        float skip = block.y * floor((block.x - t) / dt) * dt;
+      while (at >= exit) {
+        vec2 block = blockAhead(bricks, at);
+        // The ray skips whole steps whose samples lie in the block, so that the other samples lie
+        // where they would lie without skipping.
+        float skip = block.y * min(ceil((block.x - at) / dt), floor((stop - t) / dt)) * dt;
         t += skip;
-        exit = skip > 0.0 && t < brink ? t : max(block.x, t + 0.5 * dt);
         left -= step(dt, skip);
         dt = max(uMinStep, (end - t) / max(left, 1.0));
+        here = clamp(stop - t, 0.0, dt);
+        at = t + shift * here;
+        exit = skip > 0.0 && t < brink ? at : max(block.x, at + slack);
       }
-      float here = clamp(stop - t, 0.0, dt);  // the last step may be shorter; 0 after the last skip
-      float at = t + shift * here;
       vec3 p = texStart + at * texDir;
       vec4 v = sampleIntensities(p);
 #ifdef TWO_D
-      if (any(greaterThan(v, uFloor)) && mayShow(v)) {
+      if (isVisible(v) && mayShow(v)) {
 #else
-      if (any(greaterThan(v, uFloor))) {
+      if (isVisible(v)) {
 #endif
 #ifdef DISC
-        vec4 voxels = here * uDensity / uVoxel * weights(start + at * dir);
+        vec4 voxels = here * density * weights(start + at * dir);
 #else
-        vec4 voxels = vec4(here * uDensity / uVoxel * uPresence);
+        vec4 voxels = vec4(here * density);
 #endif
         vec4 shares;
 #ifdef TWO_D
@@ -250,12 +266,12 @@ void main() {
 #else
         if (s.a > 0.0) {
 #ifndef UNLIT  // for the benchmark, which times other programs without lighting
-          bool isCut = t < uVoxel && face != vec3(0.0);
+          bool isCut = t < 0.5 * uVoxel && face != vec3(0.0);  // the first step
           vec3 gradient = isCut ? -face : vec3(0.0);
           if (!isCut && (1.0 - sum.a) * s.a >= FAINT) {
             gradient = gradientAt(p, texPerUm, uContrast * shares);
           }
-          s.rgb = shadeBy(s.rgb, gradient, dir, start + at * dir);
+          s.rgb = shadeBy(s.rgb, gradient, rayLight, start + at * dir);
 #endif
           sum += (1.0 - sum.a) * vec4(s.rgb * s.a, s.a);
         }
