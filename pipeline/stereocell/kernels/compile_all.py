@@ -90,7 +90,6 @@ from stereocell.kernels.xxhash import xxh32
 
 OF_MESHES = "of-meshes"  # argument of the process that compiles the kernels of meshes
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
-_TWINS = [11, 6, 3, 2, 8, 9, 1, 10, 4, 5, 7, 0]  # twin of each half-edge of _TRIANGLES
 _TRIANGLES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
 
 
@@ -105,7 +104,7 @@ def compile_all() -> None:
 
 
 def compile_of_meshes() -> None:
-    """Compile the kernels that simplify and repair meshes. They take half of the time."""
+    """Compile the kernels of meshes and of their grids. They take half of the time."""
     at, triangles, flags = _CORNERS, _TRIANGLES, np.ones(4, bool)
     twins = match_twins(triangles, 4)
     count_fans(triangles, twins, 4)
@@ -141,11 +140,6 @@ def compile_of_meshes() -> None:
     collapse_interfaces(at, triangles, flags, errors, 3.0, 0.9, orders, nothing)
     thin_rim(at, triangles, np.zeros(4, np.int8), np.zeros(4, np.uint8), flags, 0.1, 0.9)
 
-
-def compile_others() -> None:
-    """Compile the kernels of grids, distances and voxels."""
-    at, triangles, flags = _CORNERS, _TRIANGLES, np.ones(4, bool)
-    twins = np.array(_TWINS, np.int32)
     low, high = bound_boxes(at, triangles)
     origin, edge, shape = low.min(axis=0), 0.5, np.array([3, 3, 3])
     count_entries(low, high, origin, edge)
@@ -153,6 +147,16 @@ def compile_others() -> None:
     find_near(low, high, flags, origin, edge, shape)
     first, listed = list_by_cell(low, high, origin, edge, shape)
     find_maybe_flat(at, triangles)
+    spread = find_spread(at, triangles)
+    find_candidates(at, triangles, flags, spread, low, high, first, listed, origin, edge, shape)
+    cells = first, listed, origin, edge, shape
+    _, nearest, parts = find_nearest(at, at, triangles, *cells, np.full(4, -1, np.int32), 0)
+    find_sides(at, nearest, parts, at, triangles, twins)
+
+
+def compile_others() -> None:
+    """Compile the kernels of voxels, objects, pictures and files."""
+    at, triangles = _CORNERS, _TRIANGLES
     sides = np.tile(np.array([0, 1], np.int32), (4, 1))
     entries, own = slope_volumes(at, triangles, sides, np.array([-1, 0], np.int32))
     couple(*entries, own, 1)
@@ -161,12 +165,6 @@ def compile_others() -> None:
     least_of_objects(triangles, sides, own, 1.0, 4)
     smooth_interfaces(at, np.arange(5, dtype=np.int32), triangles[:, 0].copy(), own, 0.5)
     find_critical(np.zeros((3, 3, 3), np.int32), 1)
-    spread = find_spread(at, triangles)
-    find_candidates(at, triangles, flags, spread, low, high, first, listed, origin, edge, shape)
-    cells = first, listed, origin, edge, shape
-    _, nearest, parts = find_nearest(at, at, triangles, *cells, np.full(4, -1, np.int32), 0)
-    find_sides(at, nearest, parts, at, triangles, twins)
-
     xxh32(bytes(7))
     voxels, points = np.zeros((3, 3, 3), np.float32), np.ones((2, 3), np.float32)
     find_downhill(voxels, points.astype(np.float64), np.ones(3))
