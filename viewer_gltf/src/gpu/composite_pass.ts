@@ -16,7 +16,7 @@ import {
   Vector4,
 } from "three";
 import type { Eyes } from "./eyes";
-import { coversFrame } from "./has_edges";
+import { declareCovering } from "./has_edges";
 import { partOf } from "./offscreen_target";
 import { COMPOSITE_FRAGMENT, COMPOSITE_VERTEX } from "./shaders/sources";
 
@@ -102,7 +102,7 @@ export class Overlay {
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = order;
     this.mesh.visible = false;
-    coversFrame(this.mesh);
+    declareCovering(this.mesh);
   }
 
   /**

@@ -1,13 +1,13 @@
 import { Group, LineSegments, Mesh, Scene, Sprite } from "three";
 import { describe, expect, it } from "vitest";
-import { coversFrame, hasEdges } from "./has_edges";
+import { declareCovering, hasEdges } from "./has_edges";
 
 describe("a scene", () => {
   it("has no edges if it is empty or shows only images that cover the frame", () => {
     const scene = new Scene();
     expect(hasEdges(scene)).toBe(false);
     const image = new Mesh();
-    coversFrame(image);
+    declareCovering(image);
     scene.add(image);
     expect(hasEdges(scene)).toBe(false);
   });

@@ -7,7 +7,7 @@ import { Line, Mesh, type Object3D, Sprite } from "three";
 const covering = new WeakSet<Object3D>();
 
 /** Declares that an object covers the whole frame wherever it is drawn. */
-export function coversFrame(object: Object3D): void {
+export function declareCovering(object: Object3D): void {
   covering.add(object);
 }
 

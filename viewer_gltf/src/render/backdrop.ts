@@ -14,7 +14,7 @@ import {
   Vector3,
   Vector4,
 } from "three";
-import { coversFrame } from "../gpu/has_edges";
+import { declareCovering } from "../gpu/has_edges";
 import { BACKDROP_FRAGMENT, BACKDROP_VERTEX } from "../gpu/shaders/backdrop_sources";
 import { around } from "../math/box";
 import type { Vec3 } from "../math/vec3";
@@ -64,7 +64,7 @@ export class Backdrop {
     this.mesh.geometry.setAttribute("position", new BufferAttribute(corners, 3));
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = RENDER_ORDER;
-    coversFrame(this.mesh);
+    declareCovering(this.mesh);
   }
 
   setTheme(theme: Theme): void {

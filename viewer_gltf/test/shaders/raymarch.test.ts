@@ -67,6 +67,18 @@ describeInChromium("the ray march", () => {
     },
   );
 
+  it.each(["bricks", "cells"] as const)(
+    "shows as much of a thin sheet with skips of %s, if steps are long",
+    async (skips) => {
+      for (const thickness of [2, 4, 10]) {
+        const plain = await bare.call("opacityOfSheet", null, thickness);
+        const skipping = await bare.call("opacityOfSheet", skips, thickness);
+        expect(plain).toBeGreaterThan(0.02);
+        expect(Math.abs(skipping / plain - 1), `${thickness} voxels`).toBeLessThan(0.1);
+      }
+    },
+  );
+
   it("gives a ramp the opacity of its integral", async () => {
     const [side, opacity] = [67, 20];
     // Transmittance is the product of (1 - a)^length, so its logarithm is an integral along the

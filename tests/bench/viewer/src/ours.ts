@@ -29,7 +29,7 @@ class Ours implements Renderer {
   private readonly depth = new DepthPass(new Cuts());
   private readonly frame = makeFrame(this.depth.texture);
   private readonly pass = new MarchPass(this.renderer, this.frame);
-  /** Not multisampled, because volumes have no edges: see viewer/gpu/has_edges. */
+  /** Not multisampled, because volumes have no edges: see viewer_gltf/src/gpu/has_edges. */
   private readonly light = linearTarget(this.renderer, { hasDepth: true });
   private readonly encode = new EncodePass();
   private readonly eyes = new Eyes();

@@ -19,18 +19,20 @@ vec3 lightAround(vec3 normal) {
   return around + uFillLight * max(dot(normal, vFill), 0.0);
 }
 
-// All about the light that stays the same along a ray. A software renderer would compute it again
-// for each sample.
+// The light of a ray's samples, as far as it is the same for all of them. A software renderer would
+// compute it again for each sample.
 struct RayLight {
   vec3 dir;
   vec3 halfway;  // between the directions to the lamp and to the eye
   vec3 key;  // light of the lamp on matter without a boundary, as if it faced the eye
-  vec3 around;  // the same of all other light
+  vec3 around;  // all other light on such matter
 };
 
 RayLight lightAlong(vec3 dir) {
   vec3 key = SCATTERED * uKeyLight * max(dot(-dir, vLight), 0.0);
-  return RayLight(dir, normalize(vLight - dir), key, SCATTERED * lightAround(-dir));
+  vec3 between = vLight - dir;  // zero where the ray runs straight to the lamp
+  vec3 halfway = between / max(length(between), 1e-6);
+  return RayLight(dir, halfway, key, SCATTERED * lightAround(-dir));
 }
 
 // Diffuse light by the gradient (Levoy 1988), and a highlight of the key light (Blinn 1977,

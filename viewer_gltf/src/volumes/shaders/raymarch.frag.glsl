@@ -229,9 +229,12 @@ void main() {
       // skipped.
       while (at >= exit) {
         vec2 block = blockAhead(bricks, at);
-        // The ray skips whole steps whose samples lie in the block, so that the other samples lie
-        // where they would lie without skipping.
-        float skip = block.y * min(ceil((block.x - at) / dt), floor((stop - t) / dt)) * dt;
+        // The ray skips whole steps whose samples lie in the block. Where steps can still become
+        // shorter, it skips only steps that end in the block: a long step over its end would leave
+        // out matter that the shorter steps behind it never make up for.
+        bool isShortest = dt <= uMinStep;
+        float ahead = isShortest ? ceil((block.x - at) / dt) : floor((block.x - t) / dt);
+        float skip = block.y * min(ahead, floor((stop - t) / dt)) * dt;
         t += skip;
         left -= step(dt, skip);
         dt = max(uMinStep, (end - t) / max(left, 1.0));

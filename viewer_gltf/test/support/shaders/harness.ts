@@ -281,11 +281,43 @@ function meanAlong(
   return sum.map((v) => v / 16 ** 2);
 }
 
+/**
+ * Returns the mean opacity, 0..1, of a sheet of a few voxels, seen along x through one tile of four
+ * in a row. The tile's share of the steps is so small that each is longer than the sheet is thick.
+ */
+function opacityOfSheet(skips: Skips | null, thickness: number): number {
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const [side, tiles] = [198, 4];
+  const edge = side - 3;
+  const texels = new Uint8Array(side ** 3);
+  for (let i = 0; i < texels.length; i++) {
+    const x = i % side;
+    if (x >= 101 && x < 101 + thickness) texels[i] = 255;
+  }
+  const table = new Uint8Array(1024).fill(255);
+  for (let i = 0; i < 256; i++) table[4 * i + 3] = i < 128 ? 0 : 8;
+  const bricks = makeBricks({ size: [side, side, side], texels }).texels;
+  const march = marchOf(cube(side), texels, bricks, table, skips, depth);
+  march.shareWith(new Vector3(0, -edge, 0), new Vector3(tiles * edge, 0, edge), tiles);
+  const camera = new PerspectiveCamera(0.2, 1, edge, edge * 1000);
+  camera.position.set(300 * edge, -edge / 2, edge / 2);
+  camera.lookAt(0, -edge / 2, edge / 2);
+  const rgba = draw([march], camera, depth, renderer);
+  renderer.dispose();
+  let sum = 0;
+  for (let y = 8; y < 56; y++) {
+    for (let x = 8; x < 56; x++) sum += rgba[4 * (y * PIXELS + x) + 3] / 255;
+  }
+  return sum / 48 ** 2;
+}
+
 const harness = {
   countSteps,
   countThrough,
   compareSkips,
   meanOpacity,
+  opacityOfSheet,
   meanAlong,
   columnsOverBorder,
   meansOf,
