@@ -23,7 +23,7 @@ from stereocell.cli.__main__ import main
 from stereocell.engine.run import console
 from stereocell.report import phase as report
 from stereocell.steps import learn_tissue as learn_tissue_step
-from stereocell.steps.open_source import open_source
+from stereocell.steps.open_source import forget_sources
 from stereocell.storage.claim import LOCK
 from stereocell.storage.documents import NOT_WRITTEN
 from stereocell.tissue.classify import TissueOptions
@@ -126,7 +126,7 @@ def copy(out: Path, to: Path, source: Path | None = None) -> Path:
     (to / "plan.json").write_text(json.dumps(seal(json.loads(text)), indent=1) + "\n")
     out_folder = OutFolder(to)
     out_folder.save_units(out_folder.plan(), out_folder.index())
-    open_source.cache_clear()
+    forget_sources()
     return to
 
 
@@ -377,7 +377,7 @@ def test_a_damaged_or_replaced_source_is_reported_and_nothing_is_changed(
         (Path.unlink, f"{source}: not found"),
     ):
         damage(source)
-        open_source.cache_clear()
+        forget_sources()
         capfd.readouterr()
         assert tissue(out, "--classes", "3") == 1
         assert words in only_line(capfd)

@@ -25,7 +25,7 @@ from stereocell import read
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.serve.brick_library import BrickLibrary
-from stereocell.steps.open_source import open_source
+from stereocell.steps.open_source import forget_sources
 from support import dicom_mosaics, identity_search
 from support.dicom_segmentations import write_segmentation
 from support.dicom_series import compress, grid, write_enhanced, write_series
@@ -249,9 +249,9 @@ def test_a_leak_put_in_by_hand_is_found(
         return replace(honest(location, series=series), title=str(header.PatientName))
 
     monkeypatch.setattr(dicom, "read_image", leaky)
-    open_source.cache_clear()
+    forget_sources()
     assert main(["plan", str(series), "-o", str(tmp_path / "out")]) == 0
-    open_source.cache_clear()
+    forget_sources()
     assert f"{TEXT} as bytes in plan.json" in identity_search.find(tmp_path / "out", WORDS)
 
 

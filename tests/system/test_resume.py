@@ -14,7 +14,7 @@ import pytest
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import main
-from stereocell.steps.open_source import open_source
+from stereocell.steps.open_source import forget_sources
 from support import ctrl_c, phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep
@@ -162,7 +162,7 @@ def test_source_that_was_replaced_since_the_plan_is_refused(
     source, out = _source(tmp_path), tmp_path / "out"
     assert main(["plan", str(source), "-o", str(out)]) == 0
     phantoms.write_ome_tiff(source, np.stack([phantoms.f_phantom()[:, :, ::-1]] * 2), "CZYX")
-    open_source.cache_clear()  # as if the command ran in its own process
+    forget_sources()  # as if the command ran in its own process
     capsys.readouterr()
     assert main(["units", str(out), "--workers", "0"]) == 1
     assert "f: changed since it was planned" in capsys.readouterr().err

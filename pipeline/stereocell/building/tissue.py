@@ -24,7 +24,7 @@ from stereocell.planning.plan import Plan
 from stereocell.planning.plan_source import voxels_of
 from stereocell.planning.provenance import provenance_record
 from stereocell.steps.learn_tissue import LearnTissue
-from stereocell.steps.open_source import SourceRef, open_source
+from stereocell.steps.open_source import SourceRef, forget_sources, open_source
 from stereocell.steps.tissue_files import FOLDER, VOXELS, find_fault, read_record
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.shell_commands import fill_in
@@ -175,7 +175,7 @@ def _learn(out_folder: OutFolder, plan: Plan, step: LearnTissue) -> None:
     planned = _with_classes(plan, _source_in(out_folder.out), "0" * 64, found.record)
     out_folder.require_readable(planned)
     step.FORM.write(out_folder.out / FOLDER, found)
-    open_source.cache_clear()  # OUT/tissue, which may be open as a source, holds another volume now
+    forget_sources()  # OUT/tissue, which may be open as a source, holds another volume now
 
 
 def _find_channel(plan: Plan, wanted: str) -> Channel:

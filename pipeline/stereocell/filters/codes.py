@@ -36,7 +36,7 @@ def count_each(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64]]:
     >>> distinct.tolist(), times.tolist()
     ([-1, 3], [1, 2])
     """
-    flat, counts = values.reshape(-1), np.zeros(1 << 16, np.int64)
+    flat, counts = values.ravel("K"), np.zeros(1 << 16, np.int64)  # a turned array is not copied
     for start in range(0, flat.size, _AT_ONCE):
         count_codes(codes_of(flat[start : start + _AT_ONCE]), counts)
     held = np.flatnonzero(counts)

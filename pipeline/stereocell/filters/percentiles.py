@@ -1,8 +1,11 @@
 """Percentiles and medians, equal to NumPy's bit by bit.
 
-Integers of at most 16 bits are counted by value. That takes a tenth of the time of ordering them,
-and no copy. `np.percentile` orders an array four times for one percentile, because it looks for the
-least and the largest value as well.
+There is one exception: NumPy subtracts integers in their own type, so its percentiles of signed
+integers are wrong where neighbouring values lie far apart. Here they are right.
+
+Integers of at most 16 bits are counted by value, in a tenth of the time of ordering them.
+`np.percentile` orders an array four times for one percentile, because it looks for the least and
+the largest value as well.
 """
 
 from collections.abc import Sequence
@@ -65,5 +68,5 @@ def find_percentile_in_place(values: NDArray[np.float32], percent: float) -> flo
     low = high = values[at]
     if at + 1 < len(values):
         high = values[at + 1 :].min()
-    step = high - low  # float32, as all that follows, like in NumPy
+    step = high - low  # as in NumPy, in float32
     return float(low + step * share if share < 0.5 else high - step * (1 - share))

@@ -9,7 +9,7 @@ from dataclasses import replace
 from stereocell.model.errors import SourceError
 from stereocell.planning.settings import PlanOptions
 from stereocell.read import Dataset
-from stereocell.steps.open_source import SourceRef, open_source, opened_as
+from stereocell.steps.open_source import SourceRef, forget_sources, open_source, opened_as
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
 
@@ -37,7 +37,7 @@ def reopen(ref: SourceRef) -> Dataset:
     """Return the dataset for a new plan; it is opened again if its files have changed."""
     known = _first.pop(_key(ref), None)
     if known is not None and known.changed():
-        open_source.cache_clear()
+        forget_sources()
     return open_watched(ref)
 
 
@@ -90,8 +90,7 @@ def forget() -> None:
     """Forget the state of all inputs, so that they are opened again after one has changed."""
     _first.clear()
     _tables.clear()
-    opened_as.clear()
-    open_source.cache_clear()
+    forget_sources()
 
 
 def _key(ref: SourceRef) -> SourceRef:

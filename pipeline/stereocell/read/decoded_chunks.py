@@ -42,7 +42,7 @@ class DecodedChunks:
     def __getitem__(self, key: Sequence[int | slice]) -> NDArray[Any]:
         """Return voxels by whole numbers and slices without steps, one for each axis."""
         ends = [
-            (one.indices(n)[:2]) if isinstance(one, slice) else (one, one + 1)
+            one.indices(n)[:2] if isinstance(one, slice) else (one, one + 1)
             for one, n in zip(key, self.shape, strict=True)
         ]
         cells = [
@@ -50,7 +50,8 @@ class DecodedChunks:
             for (start, stop), size in zip(ends, self.chunks, strict=True)
         ]
         number = prod(map(len, cells))
-        if number * prod(self.chunks) * self.dtype.itemsize > MOST_BYTES or not number:
+        # Until they are cut apart, the chunks of a window are in memory twice.
+        if not 0 < number * prod(self.chunks) * self.dtype.itemsize <= MOST_BYTES // 2:
             return np.asarray(self._array[tuple(key)])
         out = np.empty([stop - start for start, stop in ends], self.dtype)
         for cell, chunk in self._chunks(cells).items():
@@ -96,8 +97,8 @@ class DecodedChunks:
 
     def _keep(self, chunks: dict[tuple[int, ...], NDArray[Any]]) -> None:
         with _lock:
-            for cell, chunk in chunks.items():
-                _kept[self._number, cell] = chunk
-            held = sum(chunk.nbytes for chunk in _kept.values())
+            held = sum(chunk.nbytes for chunk in (*_kept.values(), *chunks.values()))
             while held > MOST_BYTES:
                 held -= _kept.popitem(last=False)[1].nbytes
+            for cell, chunk in chunks.items():
+                _kept[self._number, cell] = chunk

@@ -21,8 +21,7 @@ class WholeArray:
     """Time points of one volume, (t, z, y, x); the last one that was read is cached.
 
     shape  (t, z, y, x) in voxels
-    load   returns the voxels (z, y, x) of a time point; they may be a turned view, which is copied,
-           because each window that is read would have to be copied otherwise
+    load   returns the voxels (z, y, x) of a time point; they may be a turned view of a larger array
     """
 
     def __init__(
@@ -39,10 +38,14 @@ class WholeArray:
         self._held: tuple[int, NDArray[Any]] | None = None
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
-        """Return voxels by (t, z, y, x): a whole number, then slices or whole numbers."""
+        """Return voxels by (t, z, y, x): a whole number, then slices or whole numbers.
+
+        A window of a turned view is copied, in an order in which later passes over it are fast.
+        """
         time, *place = key
         with self._lock:
             if self._held is None or self._held[0] != time:
                 self._held = None  # frees the old time point first, so that memory never holds two
-                self._held = (time, in_order(self._load(time)))
-            return self._held[1][tuple(place)]
+                self._held = (time, self._load(time))
+            found = self._held[1][tuple(place)]
+        return in_order(found) if found.ndim == 3 else found

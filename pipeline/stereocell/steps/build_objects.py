@@ -19,6 +19,7 @@ from stereocell.objects.build_objects import BuiltObjects, build_objects
 from stereocell.objects.extents import Runs
 from stereocell.objects.intensities import QUANTILES, Intensities, measure_intensities
 from stereocell.objects.options import ObjectOptions
+from stereocell.read.decoded_chunks import forget_chunks
 from stereocell.steps.labels import Labels
 from stereocell.steps.open_source import Voxels
 from stereocell.steps.unit_files import UNIT_FOLDER, UnitFolder
@@ -94,6 +95,7 @@ def _build(task: BuildObjects) -> Unit:
         return Unit((), None, None, "no object", 0, 0, {}, objects=_none(task))
     start = time.perf_counter()
     voxels = task.labels.open().read(task.window)
+    forget_chunks()  # objects need more memory than the passes before them
     compact, names = _numbered(task, voxels)
     del voxels
     clock.seconds["read"] = time.perf_counter() - start

@@ -8,6 +8,7 @@ from stereocell import read
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
+from stereocell.read.decoded_chunks import forget_chunks
 from stereocell.read.known_formats import format_of
 from stereocell.storage.workspace import fetch
 
@@ -65,11 +66,21 @@ class Voxels:
 opened_as: dict[SourceRef, SourceRef] = {}
 
 
-@lru_cache(maxsize=2)
 def open_source(ref: SourceRef) -> read.Dataset:
     """Return the dataset, opened once for all calls with the same reference."""
-    other = opened_as.get(ref, ref)
-    return open_afresh(ref) if other == ref else open_source(other)
+    return _opened(opened_as.get(ref, ref))
+
+
+@lru_cache(maxsize=2)
+def _opened(ref: SourceRef) -> read.Dataset:
+    return open_afresh(ref)
+
+
+def forget_sources() -> None:
+    """Open each source again when it is needed next."""
+    opened_as.clear()
+    _opened.cache_clear()
+    forget_chunks()
 
 
 def open_afresh(ref: SourceRef) -> read.Dataset:
