@@ -24,6 +24,7 @@ _SIGNS = re.compile(
     re.IGNORECASE,
 )
 _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # parameters of glibc's `mallopt`
+KEPT_BYTES = 600e6  # resident memory up to which a process keeps what it has freed
 
 
 def keep_freed_memory() -> None:
@@ -46,12 +47,17 @@ def keep_freed_memory() -> None:
 
 
 def release_freed_memory() -> None:
-    """Return to the system what `keep_freed_memory` has kept.
+    """Return to the system what `keep_freed_memory` has kept, if the process holds much memory.
 
     Between two tasks of a build this is up to a gigabyte. The next task's arrays have other sizes,
-    so they would not fit into all of it, and the peak of the memory would grow from task to task.
+    so they would not fit into all of it, and the peak of the memory would grow from task to task. A
+    process with less than KEPT_BYTES keeps its memory, because Linux would clear it again for the
+    next task: a twelfth of the CPU time of a build of small tiles.
     """
-    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
+    if sys.platform != "linux" or not hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
+        return
+    pages = int(Path("/proc/self/statm").read_text("utf-8").split()[1])
+    if pages * os.sysconf("SC_PAGE_SIZE") > KEPT_BYTES:
         libc.malloc_trim(0)
 
 
