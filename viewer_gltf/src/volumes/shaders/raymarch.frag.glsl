@@ -230,8 +230,8 @@ void main() {
       while (at >= exit) {
         vec2 block = blockAhead(bricks, at);
         // The ray skips whole steps whose samples lie in the block. Where steps can still become
-        // shorter, it skips only steps that end in the block: a long step over its end would leave
-        // out matter that the shorter steps behind it never make up for.
+        // shorter, it skips only steps that end in the block. A long step over its end would leave
+        // out matter, and the shorter steps behind it would not make up for that.
         bool isShortest = dt <= uMinStep;
         float ahead = isShortest ? ceil((block.x - at) / dt) : floor((block.x - t) / dt);
         float skip = block.y * min(ahead, floor((stop - t) / dt)) * dt;
