@@ -6,7 +6,8 @@
   const words = document.querySelector("[data-boot] p");
   const kB = (bytes) => `${Math.round(bytes / 1000)} kB`;
   const show = (bytes) => {
-    const come = Math.min(bytes, BUILD.bytes); // a host may have unpacked it on its way
+    // a host may have unpacked it on its way
+    const come = Math.min(bytes, BUILD.bytes);
     bar.value = come / BUILD.bytes;
     words.textContent = `Loading the viewer: ${kB(come)} of ${kB(BUILD.bytes)}`;
   };
@@ -60,7 +61,8 @@
   const start = async () => {
     globalThis.stereocellBase = new URL(BUILD.base, location.href).href;
     const style = fetchStyle();
-    style.catch(() => undefined); // it is awaited below
+    // it is awaited below
+    style.catch(() => undefined);
     const code = await fetchCode();
     await style;
     words.textContent = "Starting the viewer";
@@ -68,7 +70,8 @@
     await globalThis.stereocellCode;
   };
 
-  if (location.protocol === "file:") return; // it has been said
+  // it has been said
+  if (location.protocol === "file:") return;
   show(0);
   start().catch((error) => {
     // the code itself says what fails once it runs

@@ -93,21 +93,27 @@ async function scriptFor(folder: string, plain: string, style: string): Promise<
   return bare.replace("const BUILD = {}", () => `const BUILD = ${JSON.stringify(build)}`);
 }
 
-/** Puts script and skeleton into the page, in place of the elements that load code and style directly. */
+/**
+ * Puts script and skeleton into the page, in place of the elements that load code and style directly. Comments and
+ * indentation of the page are left out.
+ */
 async function writePage(path: string, script: string): Promise<void> {
   const style = (await readFile(new URL("skeleton.css", BOOT), "utf8"))
     .replace(/\/\*.*?\*\//gs, "")
-    .replace(/\s+/g, " ");
+    .replace(/\s+/g, " ")
+    .replace(/([{};:,]) | (?=[{}])/g, "$1");
   const skeleton =
     "<div data-boot><main><h1>StereoCell</h1>" +
     '<progress value="0" aria-label="Loading the viewer"></progress><p role="status"></p></main><aside></aside></div>';
   const page = (await readFile(path, "utf8"))
+    .replace(/\s*<!--.*?-->/gs, "")
+    .replace(/^ +(?=<)/gm, "")
     .replace(/\s*<script type="module"[^>]*><\/script>/, "")
     // A disabled link is not fetched. Later parts see from its address that the style is already loaded.
     .replace('<link rel="stylesheet"', "$& disabled")
-    .replace("</head>", () => `<style>${style}</style>\n  </head>`)
+    .replace("</head>", () => `<style>${style}</style>\n</head>`)
     .replace('<div id="app">', (opening) => `${opening}${skeleton}`)
-    .replace("</body>", () => `<script>${script}</script>\n  </body>`)
+    .replace("</body>", () => `<script>${script}</script>\n</body>`)
     .replace("script-src 'self'", `script-src 'self' blob: ${hashOf(script)}`)
     .replace("style-src 'self'", `style-src 'self' blob: ${hashOf(style)}`);
   await writeFile(path, page);
