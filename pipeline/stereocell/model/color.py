@@ -21,8 +21,8 @@ def to_srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     linear  float32, any shape, 0..1; values outside are clipped
     result  uint8, same shape, 0..255
     """
-    # A table by the upper half of a float32's bits takes a fifth of the time of a power. The values
-    # of an entry become at most two different bytes.
+    # A table by the upper half of a float32's bits takes a fifth of the time of a power. An entry
+    # is a byte, and a value is compared once with the least value that has the next byte.
     first, least = _srgb_table()
     clipped = np.clip(np.asarray(linear, np.float32), 0, 1)
     found = first[clipped.view(np.uint32) >> 16]

@@ -124,13 +124,13 @@ def count_in_bins(
     window  lowest and highest value that is counted, within the edges
     clips   whether voxels beyond the window are clipped to it; otherwise they are left out
     """
-    flat, counts = voxels.reshape(-1), np.zeros(len(edges) - 1, np.int64)
+    counts = np.zeros(len(edges) - 1, np.int64)
     low, high = (float(end) for end in window)
     if has_codes(voxels.dtype):
         values, times = count_each(voxels)
         count_values(values.astype(np.float64), times, edges, low, high, clips, counts)
         return counts
-    once = np.ones(_AT_ONCE, np.int64)
+    flat, once = voxels.reshape(-1), np.ones(_AT_ONCE, np.int64)
     for start in range(0, flat.size, _AT_ONCE):
         part = flat[start : start + _AT_ONCE].astype(np.float64)
         count_values(part, once, edges, low, high, clips, counts)

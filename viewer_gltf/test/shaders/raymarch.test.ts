@@ -79,6 +79,15 @@ describeInChromium("the ray march", () => {
     },
   );
 
+  it("mixes a volume that fades in with the one before it", async () => {
+    const [before, half, after] = await Promise.all(
+      [0, 0.5, 1].map((fresh) => bare.call("opacityWhileFading", fresh)),
+    );
+    expect(before).toBe(0);
+    expect(half).toBeGreaterThan(0.3 * after);
+    expect(half).toBeLessThan(0.8 * after);
+  });
+
   it("gives a ramp the opacity of its integral", async () => {
     const [side, opacity] = [67, 20];
     // Transmittance is the product of (1 - a)^length, so its logarithm is an integral along the

@@ -312,12 +312,37 @@ function opacityOfSheet(skips: Skips | null, thickness: number): number {
   return sum / 48 ** 2;
 }
 
+/** Returns the mean opacity, 0..1, of a full cube that has faded in over an empty one to a share. */
+function opacityWhileFading(fresh: number): number {
+  const renderer = new WebGLRenderer();
+  const depth = new DepthPass(new Cuts());
+  const side = 35;
+  const packed = (texels: Uint8Array<ArrayBuffer>) => ({
+    channels: ["A"],
+    level: 0,
+    texture: texture3D(texels, side),
+    index: null,
+    bricks: [makeBricks({ size: [side, side, side], texels }).texels],
+    cells: [cellRanges(texels, [side, side, side])],
+  });
+  const table = new Uint8Array(1024).fill(255);
+  for (let i = 0; i < 256; i++) table[4 * i + 3] = Math.round(i / 32);
+  const texels = new Uint8Array(side ** 3).fill(255);
+  const shown = packed(texels);
+  const march = marchOf(cube(side), texels, shown.bricks[0], table, null, depth);
+  march.show(shown, packed(new Uint8Array(side ** 3)), fresh, 1);
+  const rgba = draw([march], diagonalCamera(side - 3), depth, renderer);
+  renderer.dispose();
+  return rgba[4 * (32 * PIXELS + 32) + 3] / 255;
+}
+
 const harness = {
   countSteps,
   countThrough,
   compareSkips,
   meanOpacity,
   opacityOfSheet,
+  opacityWhileFading,
   meanAlong,
   columnsOverBorder,
   meansOf,
