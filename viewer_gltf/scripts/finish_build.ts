@@ -107,7 +107,8 @@ async function writePage(path: string, script: string): Promise<void> {
     '<progress value="0" aria-label="Loading the viewer"></progress><p role="status"></p></main><aside></aside></div>';
   const page = (await readFile(path, "utf8"))
     .replace(/\s*<!--.*?-->/gs, "")
-    .replace(/^ +(?=<)/gm, "")
+    // The spaces before the end of a script belong to it, and so to its hash.
+    .replace(/^ +(?=<(?!\/script>))/gm, "")
     .replace(/\s*<script type="module"[^>]*><\/script>/, "")
     // A disabled link is not fetched. Later parts see from its address that the style is already loaded.
     .replace('<link rel="stylesheet"', "$& disabled")
