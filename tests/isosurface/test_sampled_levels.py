@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import zarr
 from numpy.typing import NDArray
 
 from corpus.case import Case
@@ -14,9 +15,12 @@ from stereocell.isosurface.channel_level import find_levels
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import Sums, TileEvidence, gather_evidence
 from stereocell.model.tiling import Box
+from stereocell.samples.cycif import SPACING_UM, write_cycif
 
 MADE = ("two classes", "shells", "tissue", "eight bit", "balls, 15%, x 1, 40 photons, uneven")
 REAL = ("nuclei", "CT bone", "MRI head", "mouse brain")
+SAMPLE = {"grid": (1, 1), "tile_size": (97, 320, 320), "seed": 0, "brightness_spread": 1.0}
+CHANNELS = ("Hoechst", "MART1", "CD31")
 # Volumes whose level follows the sample, and why
 FAILING = {
     "one blob": "the level of a single small body follows its few voxels",
@@ -40,6 +44,14 @@ SAMPLES = {
 }
 
 
+@pytest.fixture(scope="module")
+def cycif(tmp_path_factory: pytest.TempPathFactory) -> NDArray[np.uint16]:
+    """The voxels of a tile of the sample `cycif`, (c, z, y, x)."""
+    path = tmp_path_factory.mktemp("sample") / "block.ome.zarr"
+    write_cycif(path, **SAMPLE)
+    return np.asarray(zarr.open_array(path / "0", mode="r")[:])
+
+
 def _case(name: str) -> Case:
     if name in (*REAL, "light sheet, cells") and data_folder() is None:
         pytest.skip("needs STEREOCELL_DATA")
@@ -48,7 +60,7 @@ def _case(name: str) -> Case:
 
 
 def _level_of_part(search: LevelSearch, part: tuple[slice, ...]) -> float:
-    """Return the first level by a part of the voxels."""
+    """Return the outermost level of a surface by a part of the voxels."""
     voxels, _ = search.case.load()
     under = search.field - search.above
 
@@ -83,7 +95,20 @@ def _level_of_part(search: LevelSearch, part: tuple[slice, ...]) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HALVED)
 def test_the_level_is_the_same_on_half_of_the_voxels(name: str) -> None:
-    search = search_levels(_case(name))
+    _compare_halves(_case(name))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_the_level_of_a_stain_is_the_same_on_half_of_the_voxels(
+    cycif: NDArray[np.uint16], channel: str
+) -> None:
+    voxels = cycif[CHANNELS.index(channel)]
+    _compare_halves(Case(channel, "looked at", SPACING_UM, lambda: (voxels, None)))
+
+
+def _compare_halves(case: Case) -> None:
+    search = search_levels(case)
     level = search.found.shown()[0]
     found = {sample: _level_of_part(search, part) for sample, part in SAMPLES.items()}
     same = pytest.approx(level.value, abs=SAME * level.contrast)
