@@ -88,8 +88,10 @@ def watch(
 
 def environment_of(checkout: Path | None) -> dict[str, str]:
     """Return environment variables with which Python finds a checkout's code; None is this one."""
-    here = Path(__file__).parents[2]
-    return os.environ | {"PYTHONPATH": str((checkout or here) / "pipeline")}
+    code = (checkout or Path(__file__).parents[2]).resolve() / "pipeline"
+    if not (code / "stereocell").is_dir():  # Python would find the installed package instead
+        raise SystemExit(f"{checkout}: no pipeline/stereocell, expected a checkout of StereoCell")
+    return os.environ | {"PYTHONPATH": str(code)}
 
 
 def _look(
