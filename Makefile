@@ -79,7 +79,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup setup-dev demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-build bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
+.PHONY: help setup setup-dev demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-build bench-builds bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -345,6 +345,9 @@ bench: setup-dev ## Compare pairs of alternatives in one run (ratios of medians)
 bench-build: setup-dev ## Measure each phase of a build of INPUT into OUT, with the check  (WORKERS=1 ARGS="--preset mri")
 	$(WITH_ARGS) $(BIN)/python tests/bench/phases.py "$$OUT" "$$WORKERS" "$$INPUT" ARGS
 
+bench-builds: setup-dev ## Measure each phase of a sample tile and of real volumes, on 1 and 2 workers  (ARGS="--baseline CHECKOUT --publish")
+	$(WITH_ARGS) $(BIN)/python tests/bench/builds.py out/bench-builds ARGS
+
 bench-live: setup-dev ## Time `stereocell view SOURCE`: first picture, its colours, and answers while a build runs
 	$(BIN)/python tests/bench/live_view.py
 	$(BIN)/python tests/bench/live_color.py
@@ -355,14 +358,14 @@ bench-start: setup-dev ## Time the imports of a command and `stereocell --help`
 bench-size: setup-dev ## Measure the disk space of each requirement
 	$(BIN)/python tests/bench/install_size.py
 
-bench-scale: setup-dev ## Measure units per second, memory and bytes read for 4 to 32 units, and a whole dataset
-	$(BIN)/python tests/bench/scale.py out/bench-scale
+bench-scale: setup-dev ## Measure units per second, memory and bytes read for 4 to 32 units, noise, and a whole dataset  (ARGS=--publish: for the docs)
+	$(WITH_ARGS) $(BIN)/python tests/bench/scale.py out/bench-scale ARGS
 
-bench-scene: setup-dev ## Time the paper's scene (5 x 2 tiles of 194 x 512 x 512, 3 channels) on 1 and 2 workers and a cluster
-	$(BIN)/python tests/bench/scene.py out/bench-scene
+bench-scene: setup-dev ## Time the paper's scene (5 x 2 tiles of 194 x 512 x 512, 3 channels) on 1 and 2 workers and a cluster  (ARGS=--publish)
+	$(WITH_ARGS) $(BIN)/python tests/bench/scene.py out/bench-scene ARGS
 
-bench-breadth: setup-dev ## Time builds of many small units: up to 22 x 11 tiles of 64^3, 4 channels
-	$(BIN)/python tests/bench/breadth.py out/bench-breadth
+bench-breadth: setup-dev ## Time builds of many small units: up to 22 x 11 tiles of 64^3, 4 channels  (ARGS=--publish: for the docs)
+	$(WITH_ARGS) $(BIN)/python tests/bench/breadth.py out/bench-breadth ARGS
 
 bench-iso: setup-dev ## Score the iso-values found on a corpus of volumes, and those of other programs; also on empty volumes
 	$(BIN)/python tests/bench/iso.py

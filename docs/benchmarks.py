@@ -15,8 +15,8 @@ FIGURES = ROOT / "tests" / "bench" / "figures"
 PAGE = ROOT / "docs" / "benchmarks.md"
 # The files of FIGURES in the order of the page
 TOPICS = (
-    *("surfaces", "objects", "iso_values", "tissue", "scene", "scale", "breadth", "exports"),
-    *("frames", "ray_march", "bricks"),
+    *("surfaces", "objects", "iso_values", "tissue", "scene", "builds", "scale", "breadth"),
+    *("exports", "frames", "ray_march", "bricks"),
 )
 _HEAD = """# Benchmarks
 

@@ -7,7 +7,6 @@ printed only where there is nothing to compare with. The bench never fails on a 
 import statistics
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from scipy import ndimage
 from skimage import measure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from machine import measure_reference, stated
+from machine import Spent, stated, timed, typical
 
 from stereocell.building import phases
 from stereocell.engine.run import Engine
@@ -52,16 +51,14 @@ def compare(name: str, ours: Callable[[], object], peer: Callable[[], object], w
 
     Prints how many times as fast ours is, by the medians.
     """
-    seconds: dict[str, list[float]] = {"ours": [], "peer": []}
+    rounds: dict[str, list[Spent]] = {"ours": [], "peer": []}
     for _ in range(ROUNDS):
         for label, call in (("ours", ours), ("peer", peer)):
-            start = time.process_time()
-            call()
-            seconds[label].append(time.process_time() - start)
-    a, b = (statistics.median(seconds[label]) for label in ("ours", "peer"))
-    reference = measure_reference()
-    print(f"{name:<34} {a:8.3f} s of CPU, {a / reference:6.1f} references   {b / a:6.2f} x as fast "
-          f"as {what} ({b:.3f} s)")  # fmt: skip
+            with timed() as spent:
+                call()
+            rounds[label].append(spent)
+    a, b = (typical(*rounds[label]) for label in ("ours", "peer"))
+    print(f"{name:<34} {a}   {b.cpu / a.cpu:6.2f} x as fast as {what} ({b.cpu:.3f} s of CPU)")
 
 
 def main() -> None:
@@ -109,7 +106,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "nuclei.ome.tif"
         write_ome_tiff(source, np.clip(voxels, 0, 65535).astype(np.uint16), spacing=SPACING)
-        seconds = {}
+        costs = {}
         for workers in (1, 2):
             out = Path(folder) / str(workers)
             phases.make_plan(
@@ -119,19 +116,21 @@ def main() -> None:
             )
             engine = Engine(workers)
             engine.run("warm-up", abs, [("a", -1), ("b", -2)])
-            start = time.perf_counter()
-            phases.run_units(out, engine)
-            seconds[workers] = time.perf_counter() - start
+            with timed() as costs[workers]:
+                phases.run_units(out, engine)
             engine.close()
-        print(f"units with 2 workers: {seconds[1] / seconds[2]:.2f} x as fast as with 1")
+        ratio = costs[1].seconds / costs[2].seconds
+        print(f"units with 2 workers: {ratio:.2f} x as fast as with 1")
     with tempfile.TemporaryDirectory() as folder:
         stage = write_many(Path(folder))
-        opened = [open_unloaded(stage) for _ in range(ROUNDS)]
+        with timed() as spent:
+            opened = [open_unloaded(stage) for _ in range(ROUNDS)]
         median = statistics.median(one["seconds"] for one in opened)
         growth = opened[0]["growth_kib"]
         held = "" if growth is None else f", {growth / 1024:.0f} MiB"
         units = COLUMNS * ROWS * CHANNELS
-        print(f"a stage of {units} units opens unloaded in {median:.2f} s{held}")
+        print(f"a stage of {units} units opens unloaded in {median:.2f} s{held}; "
+              f"{ROUNDS} processes that did this: {typical(spent)}")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from threading import Thread
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from machine import stated
+from machine import Spent, stated, timed, typical
 from websockets.sync.client import connect
 
 from stereocell.cli.__main__ import main as stereocell
@@ -78,19 +78,20 @@ def main(source: Path) -> int:
 
 
 def print_build(voxels: np.ndarray, threshold: int, ktx2_bytes: int) -> None:
-    times = []
+    builds, encodings = list[Spent](), list[Spent]()
     for _ in range(3):
-        start = time.perf_counter()
-        bvh = build(voxels, threshold)
-        built = time.perf_counter()
-        data = encode_tree(bvh, bytes(16))
-        times.append((built - start, time.perf_counter() - built))
-    seconds = np.median(times, axis=0)
+        with timed() as spent:
+            bvh = build(voxels, threshold)
+        builds.append(spent)
+        with timed() as spent:
+            data = encode_tree(bvh, bytes(16))
+        encodings.append(spent)
     again = reassemble(bvh)
     differs = again != voxels
     above = int(np.count_nonzero(differs & ((voxels > threshold) | (again > threshold))))
     print(f"volume {voxels.shape} (z, y, x), threshold {threshold}")
-    print(f"build {seconds[0]:.2f} s, serialise {seconds[1]:.2f} s (medians of 3)")
+    for name, rounds in (("build", builds), ("serialise", encodings)):
+        print(f"{name:9} {typical(*rounds)} (medians of 3)")
     print(f"{len(bvh.nodes):,} nodes, {len(bvh.bricks):,} bricks, {len(data):,} bytes")
     print(f"of the KTX2 file's bytes: {len(data) / ktx2_bytes:.2f}")
     print(f"texels that came back otherwise: {differs.mean():.4f} of all, above threshold: {above}")
@@ -123,28 +124,30 @@ def print_stream(out: Path, volume: Volume, voxels: np.ndarray, shown: np.ndarra
                         stream.send(json.dumps(answer))
 
             stream.send('{"type": "hello", "version": 1}')
-            start = time.perf_counter()
             wanted = {"tile": volume.tile, "channel": volume.channel}
-            stream.send(json.dumps({"type": "open", "volumes": [wanted]}))
-            until(lambda: client.is_ready(0))
+            with timed() as spent:
+                stream.send(json.dumps({"type": "open", "volumes": [wanted]}))
+                until(lambda: client.is_ready(0))
             tree = client.trees[0]
             print(f"\nbricks by view, gaze in the middle (table {client.table_bytes:,} bytes,")
-            print(f"first `tree` after {time.perf_counter() - start:.2f} s)")
+            print(f"first `tree` after {typical(spent)})")
             print(f"{'bytes':>12} {'bricks':>7} {'PSNR dB':>8} {'above threshold':>16} {'s':>6}")
-            seconds = 0.0
+            whole = Spent()
             for id, share in enumerate(SHARES, 1):
                 budget = int(share * tree.table.brick_bytes) - client.brick_bytes
                 view = {"type": "view", "id": id, "trees": [0], "budget": max(budget, 0)}
-                start = time.perf_counter()
-                stream.send(json.dumps(view | {"pixels_per_radian": 1e3, "texel_px": 0} | camera))
-                until(lambda id=id: id in client.done)
-                seconds += time.perf_counter() - start
+                with timed() as spent:
+                    message = view | {"pixels_per_radian": 1e3, "texel_px": 0} | camera
+                    stream.send(json.dumps(message))
+                    until(lambda id=id: id in client.done)
+                whole = Spent(whole.seconds + spent.seconds, whole.cpu + spent.cpu)
                 drawn = reconstruct(tree.table, tree.frames)
                 seen = psnr(np.where(drawn > volume.threshold, drawn, 0), shown)
                 print(
                     f"{client.brick_bytes:12,} {len(tree.frames):7,} {psnr(drawn, voxels):8.2f}"
-                    f" {seen:16.2f} {seconds:6.2f}"
+                    f" {seen:16.2f} {whole.seconds:6.2f}"
                 )
+            print(f"server and client together: {typical(whole)}")
             left = tree.table.nodes["length"].astype(bool).sum() - len(tree.frames)
             print(f"`{client.done[len(SHARES)]['reason']}`; never in sight, apron alone: {left}")
     finally:

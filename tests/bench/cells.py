@@ -42,7 +42,7 @@ from cell_truth import (
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from machine import stated
+from machine import measure_reference, stated
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.meshes.distance import Nearest
@@ -268,24 +268,29 @@ def compare(case: Case, rounds: int) -> list[dict[str, Any]]:
             meshes[name] = mesh
     print(f"\n{case.name}: {count} cells, {case.labels.shape} voxels")
     print("| | triangles a cell | mean / p95 um | volume %, p2 / 50 / 98 | at fault: made, stored "
-          "| overlap % | bytes a cell | CPU s | s | MB |")  # fmt: skip
-    print("|---" * 10 + "|")
-    rows = []
+          "| overlap % | bytes a cell | CPU s | references | s | MB |")  # fmt: skip
+    print("|---" * 11 + "|")
+    rows, reference = [], measure_reference()
     for name, mesh in meshes.items():
         figures = measure(mesh, case)
         took = Spent(*map(statistics.median, zip(*map(astuple, spent[name]), strict=True)))
-        print(row(name, figures, took, count), flush=True)
-        named = {"case": case.name, "cells": count, "name": name}
+        print(row(name, figures, took, count, reference), flush=True)
+        named = {"case": case.name, "cells": count, "name": name, "reference_s": reference}
         rows.append(named | asdict(figures) | asdict(took))
     return rows
 
 
-def row(name: str, found: Figures, took: Spent, cells: int) -> str:
+def row(name: str, found: Figures, took: Spent, cells: int, reference: float) -> str:
+    """Return a row of the table.
+
+    reference  CPU seconds of the reference kernel (machine.py)
+    """
     bias = " / ".join(f"{share:+.2f}" for share in found.bias)
     return (
         f"| {name} | {found.triangles:.0f} | {found.mean:.3f} / {found.p95:.3f} | {bias} "
         f"| {found.faulty}, {found.faulty_stored} | {found.overlap:.3f} | {found.size / cells:.0f} "
-        f"| {took.cpu_s:.2f} | {took.seconds:.2f} | {took.peak_mb:.0f} |"
+        f"| {took.cpu_s:.2f} | {took.cpu_s / reference:.1f} | {took.seconds:.2f} "
+        f"| {took.peak_mb:.0f} |"
     )
 
 

@@ -5,9 +5,10 @@
 The sources are those of `STEREOCELL_DATA`, and samples. For each source, `stereocell view` first
 starts once, so that the files are cached and Python has its bytecode. Then it starts ROUNDS times
 without a build. The table has seconds from the start of the command to the page, and to the end
-of fetching the first view's files; the CPU seconds until then; and the bytes of these files and of
-the page. Then one file is requested again and again, alone and during the build. Other processes
-lengthen seconds more than CPU seconds, so the load of the machine is printed, too.
+of fetching the first view's files; the CPU seconds until then, also in units of the reference
+kernel (machine.py); and the bytes of these files and of the page. Then one file is requested again
+and again, alone and during the build. Other processes lengthen seconds more than CPU seconds, so
+the load of the machine is printed, too.
 """
 
 import json
@@ -24,7 +25,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from machine import stated
+from machine import Spent, stated, typical
 
 ROUNDS = 3
 REQUESTS = 200
@@ -53,7 +54,7 @@ def main(words: list[str]) -> None:
     given = {word: [str(Path(word).resolve())] for word in words} or {
         name: flags for name, flags in SOURCES.items() if Path(flags[0].split(":")[0]).exists()
     }
-    print(f"{'':12} page s  view s  CPU s   MB  page MB  load   alone ms  beside a build ms")
+    print(f"{'':12} page s  view s  CPU s   refs   MB  page MB  load   alone ms  beside a build ms")
     with tempfile.TemporaryDirectory() as folder:
         for name, (sample, flags) in SAMPLES.items() if not words else ():
             kind, place, *rest = sample
@@ -84,10 +85,11 @@ def measured(flags: list[str], folder: str) -> str:
         files = fetch_view(address)
         time.sleep(5)  # the build has begun after this time
         beside = latencies_ms(address, max(files, key=lambda path: files[path]))
+    cost = typical(*(Spent(view_s, spent_s) for _, view_s, spent_s, _ in first))
     page_s, view_s, spent_s, megabytes = map(statistics.median, zip(*first, strict=True))
     return (
-        f"{page_s:6.1f} {view_s:7.1f} {spent_s:6.1f} {megabytes:5.2f} {page / 1e6:7.2f} "
-        f"{os.getloadavg()[0]:6.1f}    "
+        f"{page_s:6.1f} {view_s:7.1f} {spent_s:6.1f} {cost.references:6.1f} {megabytes:5.2f} "
+        f"{page / 1e6:7.2f} {cost.load:6.1f}    "
         f"{alone[0]:4.1f} {alone[1]:4.1f}    {beside[0]:4.1f} {beside[1]:4.1f}"
     )
 

@@ -4,15 +4,17 @@
 
 Prints seconds, CPU seconds and peak memory of each phase. Beside each stand the CPU seconds in
 units of the reference kernel, which ran just before and after it (see machine.py), and the load.
-OUT is replaced.
+OUT is replaced. builds.py measures several inputs so, and compares with another checkout.
 """
 
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,44 +22,56 @@ import psutil
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import STEREOCELL
-from machine import load, measure_reference, stated
+from machine import Spent, load, measure_reference, stated
 
 from support.worker_processes import workers_of
 
 PHASES = ("units", "stage", "bundle", "report", "check")  # after the plan
 OFTEN_S = 0.2  # seconds between two looks at the processes
 MB = 1e6
+COLUMNS = ("phase", "seconds", "CPU", "references", "peak of the command, of a worker, MB")
 
 
 @dataclass
-class Cost:
-    """Cost of a command.
+class Cost(Spent):
+    """Cost of a command. The reference kernel ran before and after it.
 
-    seconds    time from start to end
-    cpu        CPU seconds of all its processes
-    reference  CPU seconds of the reference kernel, before and after the command
-    peaks      peak bytes of a process by role
+    peaks  peak bytes of a process by role
     """
 
-    seconds: float = 0.0
-    cpu: float = 0.0
-    reference: float = 0.0
     peaks: dict[str, int] = field(default_factory=lambda: defaultdict(int))
 
-    @property
-    def references(self) -> float:
-        """Return the CPU seconds in units of the reference kernel."""
-        return self.cpu / self.reference
+
+def sum_of(costs: Iterable[Cost]) -> Cost:
+    """Return the cost of commands that ran one after another."""
+    whole = Cost()
+    for cost in costs:
+        whole.seconds += cost.seconds
+        whole.cpu += cost.cpu
+        whole.load = max(whole.load, cost.load)
+        whole.reference += cost.references  # turned into a time below
+        for role, peak in cost.peaks.items():
+            whole.peaks[role] = max(whole.peaks[role], peak)
+    whole.reference = whole.cpu / whole.reference
+    return whole
 
 
-def watch(arguments: list[str], others: list[psutil.Process]) -> Cost:
-    """Run a command and measure its processes and `others`, which work for it."""
-    cost, start = Cost(), time.perf_counter()
-    before = sum(_cpu_of(other) for other in others)
+def watch(
+    arguments: list[str], others: Sequence[psutil.Process] = (), checkout: Path | None = None
+) -> Cost:
+    """Run a command and measure its processes and `others`, which work for it.
+
+    checkout  another checkout of this repository whose code runs, with the packages of this one
+    """
+    cost, before = Cost(), measure_reference()
+    start, busy = time.perf_counter(), sum(_cpu_of(other) for other in others)
     # A pipe that is not read would fill up and stop the command.
     with tempfile.TemporaryFile("w+") as errors:
         command = subprocess.Popen(
-            [*STEREOCELL, *arguments], stdout=subprocess.DEVNULL, stderr=errors
+            [*STEREOCELL, *arguments],
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            env=environment_of(checkout),
         )
         parent, spent = psutil.Process(command.pid), dict[int, float]()
         while command.poll() is None:
@@ -67,12 +81,24 @@ def watch(arguments: list[str], others: list[psutil.Process]) -> Cost:
             errors.seek(0)
             raise SystemExit(f"{' '.join(arguments)}: {errors.read()[-2000:]}")
     cost.seconds = time.perf_counter() - start
-    cost.cpu = sum(spent.values()) + sum(_cpu_of(other) for other in others) - before
+    cost.cpu = sum(spent.values()) + sum(_cpu_of(other) for other in others) - busy
+    cost.load, cost.reference = load(), (before + measure_reference()) / 2
     return cost
 
 
+def environment_of(checkout: Path | None) -> dict[str, str]:
+    """Return environment variables with which Python finds a checkout's code; None is this one."""
+    code = (checkout or Path(__file__).parents[2]).resolve() / "pipeline"
+    if not (code / "stereocell").is_dir():  # Python would find the installed package instead
+        raise SystemExit(f"{checkout}: no pipeline/stereocell, expected a checkout of StereoCell")
+    return os.environ | {"PYTHONPATH": str(code)}
+
+
 def _look(
-    parent: psutil.Process, others: list[psutil.Process], cost: Cost, spent: dict[int, float]
+    parent: psutil.Process,
+    others: Sequence[psutil.Process],
+    cost: Cost,
+    spent: dict[int, float],
 ) -> None:
     """Record the memory of all processes, and the CPU seconds of the command's own processes."""
     try:
@@ -80,11 +106,21 @@ def _look(
             (parent, "command"),
             *((worker, "worker") for worker in (*workers_of(parent), *others)),
         ]:
-            cost.peaks[role] = max(cost.peaks[role], process.memory_info().rss)
-            if process not in others:
+            is_own = process not in others
+            peak = peak_of(process.pid) if is_own else process.memory_info().rss
+            cost.peaks[role] = max(cost.peaks[role], peak)
+            if is_own:
                 spent[process.pid] = _cpu_of(process)
-    except psutil.Error:
+    except (psutil.Error, OSError):
         pass  # the process ended meanwhile
+
+
+def peak_of(pid: int) -> int:
+    """Return the largest memory, bytes, that a process ever had."""
+    for line in Path(f"/proc/{pid}/status").read_text("utf-8").splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) * 1024
+    return 0
 
 
 def _cpu_of(process: psutil.Process) -> float:
@@ -93,43 +129,73 @@ def _cpu_of(process: psutil.Process) -> float:
 
 
 def run_phases(
-    out: Path, plan: list[str], how: list[str], others: list[psutil.Process]
+    out: Path,
+    plan: list[str],
+    how: list[str],
+    others: Sequence[psutil.Process] = (),
+    checkout: Path | None = None,
 ) -> dict[str, Cost]:
     """Run all phases, print their costs, and return them.
 
-    plan    arguments of `stereocell plan`
-    how     arguments that state where units are built
-    others  processes that work for the commands
+    plan      arguments of `stereocell plan`
+    how       arguments that state where units are built
+    others    processes that work for the commands
+    checkout  another checkout of this repository whose code runs
     """
     costs = {}
     for phase in ("plan", *PHASES):
         arguments = [phase, str(out)]
         if phase == "plan":
             arguments = ["plan", "-o", str(out), *plan]
-        elif phase == "check":
-            arguments += ["--deep", *how]
-        else:
+        elif takes(phase, how[0], checkout):
             arguments += how
-        before = measure_reference()
-        cost = costs[phase] = watch(arguments, others)
-        cost.reference = (before + measure_reference()) / 2
-        peaks = ", ".join(f"{role} {most / MB:.0f}" for role, most in cost.peaks.items())
-        print(f"  {phase:7}{cost.seconds:8.1f} s {cost.cpu:8.1f} s of CPU, "
-              f"{cost.references:6.1f} references of {cost.reference:.3f} s   "
-              f"load {load():.1f}   peak, MB: {peaks}", flush=True)  # fmt: skip
-    build = [cost for phase, cost in costs.items() if phase != "check"]
-    for name, some in (("the build", build), ("with the check", [*costs.values()])):
-        print(f"  {name}: {sum(cost.seconds for cost in some) / 60:.1f} minutes, "
-              f"{sum(cost.cpu for cost in some):.0f} s of CPU, "
-              f"{sum(cost.references for cost in some):.0f} references")  # fmt: skip
+        if phase == "check":
+            arguments.append("--deep")
+        cost = costs[phase] = watch(arguments, others, checkout)
+        print(f"  {phase:7}{cost}   peak, MB: {in_mb(cost.peaks)}", flush=True)
+    for name, whole in totals(costs).items():
+        print(f"  {name}: {whole.seconds / 60:.1f} minutes, {whole.cpu:.0f} s of CPU, "
+              f"{whole.references:.0f} references")  # fmt: skip
     return costs
+
+
+def totals(costs: dict[str, Cost]) -> dict[str, Cost]:
+    """Return the cost of the build, and of the build with its check."""
+    build = [cost for phase, cost in costs.items() if phase != "check"]
+    return {"the build": sum_of(build), "with the check": sum_of(costs.values())}
+
+
+def rows_of(costs: dict[str, Cost]) -> list[list[str]]:
+    """Return the cells of COLUMNS for each phase, the build, and the build with its check."""
+    return [
+        [
+            phase, f"{cost.seconds:.1f}", f"{cost.cpu:.1f}", f"{cost.references:,.0f}",
+            "; ".join(f"{peak / MB:,.0f}" for peak in cost.peaks.values()),
+        ]
+        for phase, cost in (costs | totals(costs)).items()
+    ]  # fmt: skip
+
+
+def in_mb(peaks: dict[str, int]) -> str:
+    return ", ".join(f"{role} {most / MB:,.0f}" for role, most in peaks.items())
+
+
+def takes(phase: str, flag: str, checkout: Path | None) -> bool:
+    """Return whether a phase has a flag. In older checkouts some phases have no workers."""
+    if checkout is None:
+        return True
+    told = subprocess.run(
+        [*STEREOCELL, phase, "--help"],
+        capture_output=True, text=True, check=True, env=environment_of(checkout),
+    )  # fmt: skip
+    return flag in told.stdout
 
 
 def main() -> None:
     """Build one input and print what each phase costs."""
     _, out, workers, *plan = sys.argv
     shutil.rmtree(out, ignore_errors=True)
-    run_phases(Path(out), plan, ["--workers", workers], [])
+    run_phases(Path(out), plan, ["--workers", workers])
 
 
 if __name__ == "__main__":

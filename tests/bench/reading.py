@@ -221,6 +221,29 @@ def print_reading(reading: Reading, survey: Survey, windows: float) -> None:
           f"(bound {MAX_READ})")  # fmt: skip
 
 
+def reading_rows(reading: Reading, survey: Survey, windows: float) -> list[list[str]]:
+    """Return the rows of the published table that state reads.
+
+    windows  ratio that measure_windows() returns
+    """
+    return [
+        [
+            "read by a unit",
+            f"{reading.chunks:.2f} x the chunks that its window touches (bound {MAX_READ}); "
+            f"{reading.window:.2f} x the window itself",
+        ],
+        [
+            "read for iso-values, by tiles four chunks wide",
+            f"{survey.chunks:.2f} x the chunks that the tiles touch with their halos "
+            f"(bound {MAX_READ}), {survey.tiles:.2f} x the tiles",
+        ],
+        [
+            f"read for the display window of a channel of {' x '.join(map(str, REAL))}",
+            f"{windows:.2f} x the chunks that the voxels lie in (bound {MAX_READ})",
+        ],
+    ]
+
+
 def print_whole(
     reading: Reading, survey: Survey, windows: float, voxel: float, halo: tuple[int, int, int]
 ) -> None:

@@ -1,33 +1,33 @@
 """Measure time, memory and reads of units, and estimate them for the whole dataset.
 
-    python scale.py FOLDER [TILE]      TILE: z,y,x voxels of the slope's tiles
+    python scale.py FOLDER [TILE] [--publish]      TILE: z,y,x voxels of the slope's tiles
 
 Runs with 4 to 32 equal small tiles show how time and memory grow with the number of tiles. Hundreds
 of tiny tiles show how much memory the command keeps for each. One tile of 194 x 512 x 512 voxels,
-full of nuclei, shows the cost of a real tile. All takes twenty minutes. Samples and builds stay in
-FOLDER and are made once. Exits with 1 if a bound is exceeded.
+full of nuclei, shows the cost of a real tile. Noise and a sponge show that of the worst tiles (see
+one_unit.py). All takes half an hour. Samples and builds stay in FOLDER and are made once. Exits
+with 1 if a bound is exceeded. With `--publish`, the figures replace those of docs/benchmarks.md.
 
 The dataset's figures cover its units, which are nearly all of the work, but not its stage, bundle
 and report. reading.py estimates the reads.
 """
 
-import json
+import argparse
 import math
 import os
-import subprocess
 import sys
-import time
-from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import psutil
 import zarr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from commands import STEREOCELL, make_sample, plan
-from machine import stated
+from commands import make_sample, plan
+from machine import range_of, stated
+from one_unit import GOAL_PASSES, GOAL_TIMES, MAX_BYTES, Unit, measure_dense, measure_noisy
+from phases import Cost, watch
+from published import publish
 from reading import (
     CHANNELS,
     MAX_READ,
@@ -38,63 +38,46 @@ from reading import (
     measure_windows,
     print_reading,
     print_whole,
+    reading_rows,
     stored,
 )
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.model.tiling import cut
 from support.phantoms import write_ome_zarr
-from support.worker_processes import workers_of
 
 COUNTS = ((2, 2), (4, 2), (4, 4), (8, 4))  # columns x rows: 4 to 32 units
 MANY, SMALLEST = ((8, 8), (16, 8), (16, 16), (32, 16)), (8, 32, 32)  # 64 to 512 units
 TILES = len(cut(REGION, REAL))  # of the CyCIF dataset
 WHOLE = TILES * CHANNELS  # units of the CyCIF dataset
+DENSE = "a unit of 194 x 512 x 512, full of nuclei, with all earlier passes in the same process"
 PRICE = 0.04  # dollars for a core-hour: about what clouds ask for a core with 4 GB
 GIB = 1024**3
 MAX_GROWTH = 0.1  # largest relative growth of a process's peak memory with four times the tiles
-MAX_BYTES = 2e9  # largest peak memory of the process that builds a unit of REAL
-
-# Runs in a process of its own, which builds one unit and measures its own memory meanwhile.
-WATCHED = """
-import collections, json, sys, threading, time
-from stereocell.cli.__main__ import main
-
-def rss():
-    return int(open("/proc/self/statm").read().split()[1]) * 4096
-
-most, before, is_over = collections.defaultdict(int), rss(), False
-me = threading.main_thread().ident
-def watch():
-    while not is_over:
-        frame, place = sys._current_frames().get(me), "?"
-        while frame is not None:
-            name = frame.f_globals.get("__name__", "")
-            if name.startswith("stereocell."):
-                place = f"{name.removeprefix('stereocell.')}.{frame.f_code.co_name}"
-                break
-            frame = frame.f_back
-        most[place] = max(most[place], rss())
-        time.sleep(0.02)
-thread = threading.Thread(target=watch)
-thread.start()
-code = main(sys.argv[1:])
-is_over = True
-thread.join()
-status = open("/proc/self/status").read()  # what code that lets no thread look took as well
-peak = int(status.split("VmHWM:")[1].split()[0]) * 1024
-print(json.dumps({"code": code, "before": before, "most": most, "peak": peak}))
-"""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run of `stereocell units`: its seconds, and the peak memory of a "command" or "worker"."""
+    """A run of `stereocell units`."""
 
     units: int
     workers: int
-    seconds: float
-    peaks: dict[str, int]
+    cost: Cost
+
+
+@dataclass(frozen=True)
+class Slope:
+    """How the cost of units grows with their number, for one number of workers.
+
+    seconds     time of no units, and of one more
+    references  CPU time of one more, in units of the reference kernel
+    growths     relative growth of the peak memory by role, for four times as many tiles, twice
+    """
+
+    workers: int
+    seconds: tuple[float, float]
+    references: float
+    growths: tuple[dict[str, float], dict[str, float]]
 
 
 def repeat_sample(folder: Path, grid: tuple[int, int], tile: tuple[int, int, int]) -> Path:
@@ -111,26 +94,8 @@ def repeat_sample(folder: Path, grid: tuple[int, int], tile: tuple[int, int, int
 
 def run_units(out: Path, workers: int) -> Run:
     """Build all units, and measure the processes meanwhile."""
-    start = time.perf_counter()
-    command = subprocess.Popen(
-        [*STEREOCELL, "units", str(out), "--workers", str(workers)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    peaks: dict[str, int] = defaultdict(int)
-    parent = psutil.Process(command.pid)
-    while command.poll() is None:
-        try:
-            peaks["command"] = max(peaks["command"], _peak_of(command.pid))
-            for process in workers_of(parent):
-                peaks["worker"] = max(peaks["worker"], _peak_of(process.pid))
-        except (psutil.Error, OSError):
-            pass  # the process ended meanwhile
-        time.sleep(0.2)
-    if command.returncode:
-        raise SystemExit(f"units {out}: ended with {command.returncode}")
-    units = len(OutFolder(out).index())
-    return Run(units, workers, time.perf_counter() - start, dict(peaks))
+    cost = watch(["units", str(out), "--workers", str(workers)])
+    return Run(len(OutFolder(out).index()), workers, cost)
 
 
 def measure_slope(
@@ -147,81 +112,123 @@ def measure_slope(
             plan(str(source), out, grid, tile, "0")
             runs.append(run_units(out, workers))
             last = runs[-1]
-            peaks = ", ".join(f"{role} {most / GIB:.3f}" for role, most in last.peaks.items())
-            print(f"  {last.units:3} units  {workers} workers  {last.seconds:7.1f} s  "
-                  f"{last.units / last.seconds:6.3f} units/s  peak, GiB: {peaks}",
+            peaks = ", ".join(f"{role} {most / GIB:.3f}" for role, most in last.cost.peaks.items())
+            print(f"  {last.units:3} units  {workers} workers  {last.cost}   peak, GiB: {peaks}",
                   flush=True)  # fmt: skip
     return runs
 
 
-def print_slope(runs: list[Run]) -> list[float]:
-    """Print costs per unit; return the growth of each peak for four times as many tiles."""
-    growths = []
+def find_slopes(runs: list[Run]) -> list[Slope]:
+    """Return and print costs per unit, and the growth of each peak for four times as many tiles."""
+    slopes = []
     for workers in (1, 2):
-        own = {run.units: run for run in runs if run.workers == workers}
-        slope, start = np.polyfit(list(own), [run.seconds for run in own.values()], 1)
-        print(f"  {workers} workers: {start:.1f} s + {slope:.2f} s a unit; peaks grow")
-        for few, many in ((4, 16), (8, 32)):
-            grown = {
-                role: most / own[few].peaks[role] - 1 for role, most in own[many].peaks.items()
-            }
-            growths += grown.values()
-            by_role = ", ".join(f"{role} {growth:+.1%}" for role, growth in grown.items())
-            print(f"    from {few} to {many} units: {by_role} (bound {MAX_GROWTH:+.0%})")
-    return growths
+        own = {run.units: run.cost for run in runs if run.workers == workers}
+        more, start = np.polyfit(list(own), [cost.seconds for cost in own.values()], 1)
+        references, _ = np.polyfit(list(own), [cost.references for cost in own.values()], 1)
+        few, many = (
+            {role: most / own[a].peaks[role] - 1 for role, most in own[b].peaks.items()}
+            for a, b in ((4, 16), (8, 32))
+        )
+        slopes.append(Slope(workers, (float(start), float(more)), float(references), (few, many)))
+        print(f"  {workers} workers: {start:.1f} s + {more:.2f} s a unit, of {references:.1f} "
+              "references of CPU; peaks grow")  # fmt: skip
+        for name, growth in (("from 4 to 16", few), ("from 8 to 32", many)):
+            by_role = ", ".join(f"{role} {share:+.1%}" for role, share in growth.items())
+            print(f"    {name} units: {by_role} (bound {MAX_GROWTH:+.0%})")
+    return slopes
 
 
-def print_command(runs: list[Run]) -> None:
-    """Print what the command keeps of a tile: evidence of one channel, until its level is known."""
-    peaks = [run.peaks["command"] for run in runs]
+def command_memory(runs: list[Run]) -> float:
+    """Return the bytes that the command keeps of a tile, and print them.
+
+    They are the evidence of one channel, which is kept until its iso-value is known.
+    """
+    peaks = [run.cost.peaks["command"] for run in runs]
     each, base = np.polyfit([run.units for run in runs], peaks, 1)
     most = (base + each * TILES) / GIB
     print(f"  the command keeps {each / 1e6:.3f} MB of a channel's tile, and {base / GIB:.3f} GiB: "
           f"{most:.2f} GiB with {TILES} tiles")  # fmt: skip
+    return float(each)
 
 
-def watch_memory(out: Path) -> dict[str, int]:
-    """Build OUT's one unit in a process that measures itself; return peak bytes by function."""
-    answer = subprocess.run(
-        [sys.executable, "-c", WATCHED, "units", str(out), "--workers", "0"],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    seen = json.loads(answer.stdout.splitlines()[-1])
-    libraries = {"(interpreter and libraries)": seen["before"]}
-    return {"(the process)": seen["peak"], **libraries, **seen["most"]}
+def whole_dataset(dense: Unit) -> float:
+    """Return the core-hours of all units of the dataset, if each costs what the dense one does."""
+    return dense.cpu * WHOLE / 3600
 
 
-def _peak_of(pid: int) -> int:
-    for line in Path(f"/proc/{pid}/status").read_text("utf-8").splitlines():
-        if line.startswith("VmHWM:"):
-            return int(line.split()[1]) * 1024
-    return 0
+def rows_of(
+    slopes: list[Slope], many: list[Run], each: float, dense: Unit, noisy: dict[str, Unit]
+) -> list[list[str]]:
+    """Return the rows of the published table that have no reads."""
+    grown = {
+        role: " and ".join(
+            f"{max(slope.growths[k].get(role, 0.0) for slope in slopes):+.0%}" for k in (0, 1)
+        )
+        for role in ("worker", "command")
+    }
+    one, two = slopes
+    counts = ", ".join(str(run.units) for run in many)
+    kept = ", ".join(f"{run.cost.peaks['command'] / 1e6:.0f}" for run in many)
+    return [
+        [
+            "peak of a process, from 4 to 16 and from 8 to 32 small units",
+            f"a worker {grown['worker']} at most, the command {grown['command']} "
+            f"(bound {MAX_GROWTH:.0%})",
+        ],
+        [
+            f"the command's peak, {counts} of the smallest tiles of one channel, 2 workers",
+            f"{kept} MB: {each / 1e6:.2f} MB a tile",
+        ],
+        [
+            "4 to 32 small units, 1 and 2 workers",
+            f"{one.seconds[0]:.0f} s + {one.seconds[1]:.1f} s a unit, and {two.seconds[0]:.0f} s + "
+            f"{two.seconds[1]:.1f} s; {one.references:.1f} and {two.references:.1f} references a "
+            "unit",
+        ],
+        [
+            DENSE,
+            f"{dense.peak / 1e9:.2f} GB (bound {MAX_BYTES / 1e9:g})",
+        ],
+        [
+            "the same, CPU of all passes",
+            f"{dense.cpu:.1f} s: {dense.references:.0f} references, or {dense.passes(REAL):.1f} "
+            f"Gaussian passes over its voxels (goal {GOAL_PASSES})",
+        ],
+        *(
+            [
+                f"{name} instead of nuclei",
+                f"{unit.references / dense.references:.1f} x the CPU (goal {GOAL_TIMES}), "
+                f"{unit.peak / 1e9:.2f} GB",
+            ]
+            for name, unit in noisy.items()
+        ),
+        [
+            f"all {WHOLE:,} units of the whole dataset, if each costs as much as these nuclei",
+            f"{whole_dataset(dense):.0f} core-hours",
+        ],
+    ]
 
 
-def main(folder: Path, tile: tuple[int, int, int]) -> int:
+def main(folder: Path, tile: tuple[int, int, int], is_published: bool) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     print(f"Slope, tiles of {' x '.join(map(str, tile))}, one channel, {os.cpu_count()} cores")
-    growths = print_slope(measure_slope(folder, tile))
+    runs = measure_slope(folder, tile)
+    slopes = find_slopes(runs)
 
     print(f"The command's memory, tiles of {' x '.join(map(str, SMALLEST))}, 2 workers")
-    print_command(measure_slope(folder, SMALLEST, MANY, (2,)))
+    many = measure_slope(folder, SMALLEST, MANY, (2,))
+    each = command_memory(many)
 
     source, out = make_sample(folder, (1, 1), REAL), folder / "real"
     reading, survey = measure_reading(folder, tile), measure_survey(folder, tile)
     windows = measure_windows(folder, source)
     print_reading(reading, survey, windows)
 
-    print(f"A unit of {' x '.join(map(str, REAL))}")
-    plan(str(source), out, (1, 1), REAL, "0")
-    start = time.perf_counter()
-    seen = watch_memory(out)
-    seconds = time.perf_counter() - start
+    dense = measure_dense(folder)
     size = sum(file.stat().st_size for file in (out / "units").rglob("*") if file.is_file())
-    print(f"  {seconds:.0f} s; most memory while this ran, GiB (bound {MAX_BYTES / GIB:.2f}):")
-    for place, most in sorted(seen.items(), key=lambda item: -item[1])[:8]:
-        print(f"    {most / GIB:5.2f}  {place}")
+    noisy = measure_noisy(folder, dense)
 
-    hours = seconds * WHOLE / 3600
+    hours = whole_dataset(dense)
     print(f"{WHOLE} units of that size, without stage, bundle and report: {hours:.0f} core-hours, "
           f"{WHOLE * size / 1e12:.2f} TB of units written, "
           f"{hours * PRICE:.0f} dollars at {PRICE} a core-hour")  # fmt: skip
@@ -229,10 +236,15 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
     voxel = stored(source, settled.region) / math.prod(settled.region.shape)
     print_whole(reading, survey, windows, voxel, settled.halo)
 
+    if is_published:
+        rows = rows_of(slopes, many, each, dense, noisy) + reading_rows(reading, survey, windows)
+        costs = [*(run.cost for run in runs + many), dense, *noisy.values()]
+        publish("scale", "Growth and bounds", ("measured", "figure"), rows, range_of(costs))
+    growths = [share for slope in slopes for few in slope.growths for share in few.values()]
     kept = {
         "peaks": max(growths) <= MAX_GROWTH,
         "reading": max(reading.chunks, survey.chunks, windows) <= MAX_READ,
-        "memory": max(seen.values()) <= MAX_BYTES,
+        "memory": dense.peak <= MAX_BYTES,
     }
     for name, is_kept in kept.items():
         print(f"Bound of {name}: {'kept' if is_kept else 'NOT KEPT'}")
@@ -240,6 +252,11 @@ def main(folder: Path, tile: tuple[int, int, int]) -> int:
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("tile", nargs="?", default="48,96,96")
+    parser.add_argument("--publish", action="store_true", help="put the figures into the docs")
+    given = parser.parse_args()
     with stated():
-        given = tuple(int(n) for n in (sys.argv[2] if len(sys.argv) > 2 else "48,96,96").split(","))
-        sys.exit(main(Path(sys.argv[1]), given))  # type: ignore[arg-type]
+        shape = tuple(map(int, given.tile.split(",")))
+        sys.exit(main(given.folder, shape, given.publish))  # type: ignore[arg-type]

@@ -1,10 +1,10 @@
 """Measure the paper's whole scene, ten tiles and three channels, by 1, 2 workers or a cluster.
 
-    python scene.py FOLDER [GRID [TILE [WAYS]]]
+    python scene.py FOLDER [GRID [TILE [WAYS]]] [--publish]
 
 GRID: columns x rows (5x2). TILE: z,y,x voxels (194,512,512). WAYS: any of 1, 2 and `cluster`,
-separated by commas (all). The sample is made once (300 MB). It stays in FOLDER, like the last
-build.
+separated by commas (all). With `--publish` the cost by two workers replaces that of
+docs/benchmarks.md. The sample is made once (300 MB). It stays in FOLDER, like the last build.
 
 Prints seconds and CPU seconds of each phase, and the peak memory of the command and of a worker.
 Then it prints the build's size on disk by kind and level of detail, and the bytes that a viewer
@@ -13,6 +13,7 @@ while the gaze moves over all tiles. Exits with 1 if two ways gave different byt
 missed a tile.
 """
 
+import argparse
 import shutil
 import subprocess
 import sys
@@ -22,8 +23,9 @@ import psutil
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from commands import make_sample
-from machine import stated
-from phases import MB, Cost, run_phases
+from machine import range_of, stated
+from phases import COLUMNS, MB, Cost, rows_of, run_phases
+from published import publish
 
 from stereocell.formats.vdb import MEASURED_NAME
 from stereocell.formats.vdb_read import read_vdb_head
@@ -45,7 +47,7 @@ def build(source: Path, out: Path, grid: tuple[int, int], way: str) -> dict[str,
         with running_cluster(out.parent, CLUSTER_WORKERS) as cluster:
             workers = [psutil.Process(process.pid) for process in cluster.workers]
             return run_phases(out, plan, ["--scheduler", cluster.file], workers)
-    return run_phases(out, plan, ["--workers", way], [])
+    return run_phases(out, plan, ["--workers", way])
 
 
 def print_sizes(out: Path) -> None:
@@ -85,7 +87,11 @@ def _bytes(*files: Path) -> int:
 
 
 def main(
-    folder: Path, grid: tuple[int, int], tile: tuple[int, int, int], ways: tuple[str, ...]
+    folder: Path,
+    grid: tuple[int, int],
+    tile: tuple[int, int, int],
+    ways: tuple[str, ...],
+    is_published: bool,
 ) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     source, out = make_sample(folder, grid, tile), folder / "scene"
@@ -94,7 +100,10 @@ def main(
         shutil.rmtree(out, ignore_errors=True)
         name = f"{way} on this machine" if way != "cluster" else f"a cluster of {CLUSTER_WORKERS}"
         print(f"{grid[0]} x {grid[1]} tiles of {' x '.join(map(str, tile))}, workers: {name}")
-        build(source, out, grid, way)
+        costs = build(source, out, grid, way)
+        if is_published and way == "2":
+            around = f"by two workers, {range_of([*costs.values()])}"
+            publish("scene", "Phases of the build", COLUMNS, rows_of(costs), around)
         digests[way] = {
             f"{part}/{path}": digest
             for part in COMPARED
@@ -109,9 +118,15 @@ def main(
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("grid", nargs="?", default="x".join(map(str, GRID)))
+    parser.add_argument("tile", nargs="?", default=",".join(map(str, TILE)))
+    parser.add_argument("ways", nargs="?", default=",".join(WAYS))
+    parser.add_argument("--publish", action="store_true", help="put the figures into the docs")
+    given = parser.parse_args()
     with stated():
-        _, place, *given = sys.argv
-        columns, rows = map(int, given[0].split("x")) if given else GRID
-        z, y, x = map(int, given[1].split(",")) if len(given) > 1 else TILE
-        chosen = tuple(given[2].split(",")) if len(given) > 2 else WAYS
-        sys.exit(main(Path(place), (columns, rows), (z, y, x), chosen))
+        columns, rows = map(int, given.grid.split("x"))
+        z, y, x = map(int, given.tile.split(","))
+        ways = tuple(given.ways.split(","))
+        sys.exit(main(given.folder, (columns, rows), (z, y, x), ways, given.publish))

@@ -22,9 +22,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from machine import stated
+from machine import Spent, stated, typical
 from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 
@@ -156,7 +157,10 @@ def main() -> int:
                 assert server.stdout is not None
                 address = f"ws{server.stdout.readline().split()[0][4:]}bricks"
                 start = memory_mb(server.pid, "VmRSS")
+                process = psutil.Process(server.pid)
+                before = sum(process.cpu_times()[:2])
                 totals = asyncio.run(load(address, server.pid, options.clients, options.seconds))
+                cpu = sum(process.cpu_times()[:2]) - before
                 peak, last = (memory_mb(server.pid, n) for n in ("VmHWM", "VmRSS"))
             finally:
                 server.terminate()
@@ -170,6 +174,7 @@ def main() -> int:
         half, most = np.percentile(times, (50, 95))
         print(f"{name}: median {half * 1e3:.0f} ms, 95 % within {most * 1e3:.0f} ms")
     print(f"server: {start:.0f} MB at first, {last:.0f} MB at the end, peak {peak:.0f} MB")
+    print(f"server meanwhile: {typical(Spent(options.seconds, cpu))}")
     print(f"errors: {len(totals.errors)} {totals.errors[:3]}")
     print(f"server ended with {server.returncode}, printed {printed!r}")
     return 1 if totals.errors or printed or server.returncode else 0

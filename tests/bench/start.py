@@ -1,14 +1,13 @@
 """Time the imports of a command and `stereocell --help`, beside a Python that does nothing.
 
-Prints minimum and median of ROUNDS processes; bytecode and files are in the system's cache.
+Prints the least time and the medians of ROUNDS processes; bytecode and files are in the system's
+cache.
 """
 
-import statistics
 import subprocess
 import sys
-import time
 
-from machine import stated
+from machine import stated, timed, typical
 
 ROUNDS = 15
 PROGRAMS = {
@@ -23,12 +22,13 @@ PROGRAMS = {
 
 def main() -> None:
     for name, words in PROGRAMS.items():
-        took = []
+        rounds = []
         for _ in range(ROUNDS):
-            start = time.perf_counter()
-            subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL)
-            took.append(1000 * (time.perf_counter() - start))
-        print(f"{name:36} least {min(took):4.0f} ms, median {statistics.median(took):4.0f} ms")
+            with timed() as spent:
+                subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL)
+            rounds.append(spent)
+        least = min(spent.seconds for spent in rounds)
+        print(f"{name:36} least {least:.2f} s, medians {typical(*rounds)}")
 
 
 if __name__ == "__main__":

@@ -5,11 +5,10 @@ and biases.
 """
 
 import argparse
-import time
 from typing import Any
 
 import numpy as np
-from machine import stated
+from machine import stated, timed, typical
 from numpy.typing import NDArray
 from published import publish
 from skimage.filters import threshold_multiotsu
@@ -52,23 +51,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--publish", action="store_true", help="put the table into the docs")
     given = parser.parse_args()
-    print(f"| {' | '.join(COLUMNS)} | s |")
+    print(f"| {' | '.join(COLUMNS)} | cost |")
     print("|---" * (len(COLUMNS) + 1) + "|")
     rows = []
     for shape, noise, bias, seed in CASES:
         head = make_head(shape=shape, noise=noise, bias=bias, seed=seed)
-        start = time.perf_counter()
-        tissue = learn_tissue(
-            head.voxels, head.spacing_um, options=TissueOptions(classes=3, brain=True)
-        )
-        seconds = time.perf_counter() - start
+        with timed() as spent:
+            tissue = learn_tissue(
+                head.voxels, head.spacing_um, options=TissueOptions(classes=3, brain=True)
+            )
         inside = np.zeros(head.voxels.shape, np.int64)
         inside[tissue.mask] = 1 + by_otsu(head.voxels[tissue.mask], 3)
         ours = np.where(tissue.mask, tissue.probabilities.argmax(axis=0) + 1, 0)
         scores = [scores_of(labels, head) for labels in (ours, by_otsu(head.voxels, 4), inside)]
         case = [" x ".join(map(str, shape)), f"{noise:g}", f"{bias:g}", str(seed)]
         rows.append([*case, *scores[0], *(" ".join(each) for each in scores[1:])])
-        print(f"| {' | '.join(rows[-1])} | {seconds:.1f} |", flush=True)
+        print(f"| {' | '.join(rows[-1])} | {typical(spent)} |", flush=True)
     if given.publish:
         publish("tissue", "Dice by shape, noise and bias", COLUMNS, rows)
 

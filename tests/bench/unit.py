@@ -16,10 +16,8 @@ import argparse
 import importlib.util
 import os
 import shutil
-import statistics
 import subprocess
 import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -29,7 +27,7 @@ import cc3d
 import numpy as np
 import pyvista as pv
 import trimesh
-from machine import stated
+from machine import Spent, stated, timed, typical
 from wrap import (
     ALPHA,
     SAMPLES,
@@ -58,7 +56,7 @@ from stereocell.planning.settings import Settings
 from stereocell.planning.unit_steps import unit_options
 from stereocell.steps.unit import UnitInput, build_unit
 
-Run = Callable[[], tuple[Mesh, float]]  # returns a mesh and its seconds
+Run = Callable[[], tuple[Mesh, Spent]]
 ROUNDS = 3
 DECIMATED = 0.98  # largest share of faces that decimation may remove
 
@@ -136,13 +134,13 @@ def label_meshes(zmesh: Any, given: Input, faces: int) -> Mesh:
     return Mesh(positions, triangles.astype(np.uint32), np.zeros_like(positions))
 
 
-def timed(make: Callable[[], Mesh]) -> Run:
+def run_of(make: Callable[[], Mesh]) -> Run:
     """Return a run whose time is measured here."""
 
-    def run() -> tuple[Mesh, float]:
-        start = time.perf_counter()
-        mesh = make()
-        return mesh, time.perf_counter() - start
+    def run() -> tuple[Mesh, Spent]:
+        with timed() as spent:
+            mesh = make()
+        return mesh, spent
 
     return run
 
@@ -152,22 +150,21 @@ def runs_of(
 ) -> dict[str, Run]:
     """Return the runs by name. Rows that write their own files put the bytes into `sizes`."""
     runs = {
-        "ours, whole unit": timed(lambda: whole_unit(volume, given)),
-        "ours, paper's part": timed(lambda: wrap(given)),
+        "ours, whole unit": run_of(lambda: whole_unit(volume, given)),
+        "ours, paper's part": run_of(lambda: wrap(given)),
     }
     faces = len(wrap(given).triangles)
     if binary is not None:
         alpha, made = ALPHA * min(given.spacing), binary
 
-        def paper() -> tuple[Mesh, float]:
-            start = time.perf_counter()
-            surface = iso_surface(given)
-            extraction = time.perf_counter() - start
-            mesh, spent = chain(made, surface, alpha, folder)
-            return mesh, extraction + spent
+        def paper() -> tuple[Mesh, Spent]:
+            with timed() as spent:
+                surface = iso_surface(given)
+            mesh, further = chain(made, surface, alpha, folder)
+            return mesh, Spent(spent.seconds + further, spent.cpu + further)  # it has one thread
 
         runs["paper's chain"] = paper
-    runs["FlyingEdges, pyvista"] = timed(lambda: decimated(given, faces))
+    runs["FlyingEdges, pyvista"] = run_of(lambda: decimated(given, faces))
     gltfpack = find_gltfpack()
     if gltfpack is not None:
         name, program = "the same, gltfpack", gltfpack
@@ -177,10 +174,10 @@ def runs_of(
             sizes[name] = pack(mesh, program, folder)
             return mesh
 
-        runs[name] = timed(packed)
+        runs[name] = run_of(packed)
     if importlib.util.find_spec("zmesh"):
         zmesh = importlib.import_module("zmesh")
-        runs["zmesh"] = timed(lambda: label_meshes(zmesh, given, faces))
+        runs["zmesh"] = run_of(lambda: label_meshes(zmesh, given, faces))
     return runs
 
 
@@ -198,18 +195,19 @@ def size_of(mesh: Mesh) -> int:
 
 
 def compare(
-    name: str, given: Input, runs: dict[str, Run], rounds: int, sizes: dict[str, int]
+    name: str, given: Input, runs: dict[str, Run], count: int, sizes: dict[str, int]
 ) -> None:
-    """Print a row for each run: seconds, faces, bytes, distances in both directions, faults.
+    """Print a row for each run: time, faces, bytes, distances in both directions, faults.
 
+    count  number of rounds
     sizes  bytes of the rows that write their own files
     """
-    seconds: dict[str, list[float]] = {label: [] for label in runs}
+    rounds: dict[str, list[Spent]] = {label: [] for label in runs}
     meshes: dict[str, Mesh] = {}
-    for _ in range(rounds):
+    for _ in range(count):
         for label, run in runs.items():
             meshes[label], took = run()
-            seconds[label].append(took)
+            rounds[label].append(took)
     surface = iso_surface(given)
     reference, everything = Nearest(kept(surface), SAMPLES), Nearest(surface, SAMPLES)
     print(f"{name}: {' x '.join(map(str, given.field.shape))} voxels, um: mean / p95")
@@ -218,7 +216,7 @@ def compare(
         there, back = measure_spread(reference, target), measure_spread(target, everything)
         size = sizes.get(label) or size_of(mesh)
         print(
-            f"  {label:<21} {statistics.median(seconds[label]):7.2f} s  {len(mesh.triangles):8d} "
+            f"  {label:<21} {typical(*rounds[label])}  {len(mesh.triangles):8d} "
             f"faces  {size / 1e3:7.0f} kB  iso to mesh {there.mean:.3f} / {there.p95:.3f}"
             f"  mesh to iso {back.mean:.3f} / {back.p95:.3f}  {find_defects(mesh).total} faults",
             flush=True,

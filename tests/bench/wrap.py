@@ -10,17 +10,15 @@ import argparse
 import json
 import os
 import shutil
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from machine import stated
+from machine import Spent, stated, timed, typical
 from numpy.typing import NDArray
 
 from stereocell import read
@@ -195,26 +193,26 @@ def build_chain(folder: Path) -> Path | None:
 
 
 def compare(given: Input, binary: Path, rounds: int, folder: Path) -> None:
-    """Print a row for each chain: seconds, faces, distances."""
+    """Print a row for each chain: time, faces, distances."""
     alpha = ALPHA * min(given.spacing)
-    seconds: dict[str, list[float]] = {"ours": [], "peer": []}
+    spent: dict[str, list[Spent]] = {"ours": [], "peer": []}
     for _ in range(rounds):
-        start = time.perf_counter()
-        ours = wrap(given)
-        seconds["ours"].append(time.perf_counter() - start)
-        start = time.perf_counter()
-        surface = iso_surface(given)
-        extraction = time.perf_counter() - start
-        peer, spent = chain(binary, surface, alpha, folder)
-        seconds["peer"].append(extraction + spent)
-    a, b = (statistics.median(seconds[label]) for label in ("ours", "peer"))
+        with timed() as own:
+            ours = wrap(given)
+        with timed() as extraction:
+            surface = iso_surface(given)
+        peer, further = chain(binary, surface, alpha, folder)
+        both = Spent(extraction.seconds + further, extraction.cpu + further)  # it has one thread
+        spent["ours"].append(own)
+        spent["peer"].append(both)
+    a, b = (typical(*spent[label]) for label in ("ours", "peer"))
     reference, everything = Nearest(kept(surface), SAMPLES), Nearest(surface, SAMPLES)
-    print(f"{given.name}: {b / a:.1f} x as fast")
+    print(f"{given.name}: {b.seconds / a.seconds:.1f} x as fast")
     for label, mesh, took in (("ours", ours, a), ("paper's chain", peer, b)):
         target = Nearest(mesh, SAMPLES)
         there, back = measure_spread(reference, target), measure_spread(target, everything)
         print(
-            f"  {label:<14} {took:7.2f} s | {len(mesh.triangles):8d} faces | iso to mesh "
+            f"  {label:<14} {took} | {len(mesh.triangles):8d} faces | iso to mesh "
             f"{there.mean:.3f} / {there.p95:.3f} / {there.max:.2f}  mesh to iso "
             f"{back.mean:.3f} / {back.p95:.3f} / {back.max:.2f} um (mean / p95 / max)  "
             f"{measure_enclosure(reference, target):.0%} enclosed  "

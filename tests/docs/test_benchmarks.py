@@ -1,9 +1,10 @@
-"""The page of benchmarks shows the figures of their files, and a bench replaces one table."""
+"""The page of benchmarks shows the figures of their files, and other pages repeat some of them."""
 
 import json
 import re
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -11,6 +12,56 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).parents[2]
+# A column or a cell with a time, such as "CPU s" or "4 s + 1.8 s a unit"
+TIME = re.compile(r"(^|CPU |\d )(s|seconds|minutes|core-hours)\b|^CPU$")
+
+
+@dataclass(frozen=True)
+class Copy:
+    """A figure of a page, which repeats one of a topic of the benchmarks.
+
+    shown     pattern of the figure in the page
+    measured  pattern of the figure in the topic, whose cells are separated by " | "
+    scale     by which the figure of the topic is multiplied
+    """
+
+    page: str
+    shown: str
+    topic: str
+    measured: str
+    scale: float = 1.0
+
+
+TILE = r"(?s)By two workers.*sample tile of 194 x 512 x 512.*?the build \| "
+COPIES = [
+    Copy(page, *others)  # type: ignore[arg-type]
+    for page, copies in {
+        "size-and-time.md": [
+            (r"voxels\) \| (\S+) minutes", "scene", r"the build \| (\S+)", 1 / 60),
+            (r"minutes \((\d+) s of CPU\)", "scene", r"the build \| \S+ \| (\S+)"),
+            (r"minutes \(.*\| (\S+) GB", "scene", r"the build \|.*; (\S+)", 1e-3),
+            (r"one such tile, three channels \| (\d+) s", "builds", TILE + r"(\S+)"),
+            (r"one such tile.*\((\d+) s of CPU\)", "builds", TILE + r"\S+ \| (\S+)"),
+            (r"one such tile.*\| (\S+) GB", "builds", TILE + r"[^;]*; (\S+)", 1e-3),
+            (r"64 voxels \| (\S+) minutes", "breadth", r"968 units take (\S+) minutes"),
+            (r"64 voxels \|.*\| (\S+) GB", "breadth", r"units \|.* (\d+)\n", 1e-3),
+            (r"1000 cells of a label map \| (\d+) to", "objects", r"one tile \| (\d+) s a"),
+            (r"1000 cells .* to (\d+) s", "objects", r"(\d+) s a thousand, since"),
+            (r"\| (\S+) GB for 20,000", "objects", r"since a tile .*; (\S+) GB a worker"),
+        ],
+        "decisions/unit-of-work.md": [
+            (r"grows by (\d+) % at most", "scale", r"command .*\(bound (\d+)"),
+            (r"full of nuclei \| (\S+) GB", "scale", r"full of nuclei.*\| (\S+) GB"),
+            (r"memory \| (\S+) MB a tile", "scale", r"MB: (\S+) MB a tile"),
+            (r"64\^3 voxels \| (\S+) minutes", "breadth", r"968 units take (\S+) minutes"),
+        ],
+        "decisions/unit-of-work-scene.md": [
+            (r"it takes (\S+) minutes", "scene", r"the build \| (\S+)", 1 / 60),
+            (r"the deep check (\S+)\.", "scene", r"check \| (\S+)", 1 / 60),
+        ],
+    }.items()
+    for others in copies
+]
 
 
 @pytest.fixture
@@ -40,6 +91,36 @@ def test_each_table_names_its_machine_and_fills_its_columns(benchmarks: ModuleTy
             assert table.machine, table.title
             assert len(table.columns) > 1, table.title
             assert {len(row) for row in table.rows} == {len(table.columns)}, table.title
+
+
+def test_times_are_also_given_as_ratios_to_the_reference_kernel(
+    benchmarks: ModuleType, published: ModuleType
+) -> None:
+    timed = set()
+    for topic in map(benchmarks.read, benchmarks.TOPICS):
+        for table in topic.tables:
+            cells = [cell for row in table.rows for cell in row]
+            if not any(map(TIME.search, [*table.columns, *cells])):
+                continue
+            timed.add(topic.title)
+            is_given = any("references" in cell for cell in [*table.columns, *cells])
+            assert is_given or published.WITHOUT_REFERENCE in table.notes, table.title
+    assert {"A whole build", "Phases of builds", "Many small units", "Exports"} <= timed
+
+
+@pytest.mark.parametrize("copy", COPIES, ids=lambda copy: f"{copy.page}: {copy.shown}")
+def test_a_page_repeats_a_figure_as_it_is_measured(copy: Copy, benchmarks: ModuleType) -> None:
+    topic = benchmarks.read(copy.topic)
+    lines = [line for table in topic.tables for line in ([table.title], *table.rows)]
+    text = "\n".join([*(" | ".join(line) for line in lines), *topic.remarks])
+    if copy.measured.startswith(TILE) and "194 x 512 x 512" not in text:
+        pytest.skip("the published builds have another tile")
+    shown = re.search(copy.shown, (ROOT / "docs" / copy.page).read_text("utf-8"))
+    measured = re.search(copy.measured, text)
+    assert shown, copy.shown
+    assert measured, copy.measured
+    decimals = len(shown[1].partition(".")[2])
+    assert f"{float(measured[1].replace(',', '')) * copy.scale:.{decimals}f}" == shown[1]
 
 
 def test_the_commands_are_targets_of_make(benchmarks: ModuleType) -> None:
