@@ -31,9 +31,9 @@ def keep_freed_memory() -> None:
     """Let this process keep the memory that it frees, for its next arrays.
 
     By default glibc returns each large array to the system. Linux then clears every page again when
-    the next array is filled, which takes a sixth of a build's CPU time. The peak of the memory
-    grows by a few percent. A larger threshold is not enough: glibc allows at most 32 MB, and a
-    tile's arrays have 200. Other C libraries lack these settings, and nothing changes there. See
+    the next array is filled, which takes about a tenth of a build's CPU time. The peak of the
+    memory grows by a few percent. A larger threshold is not enough: glibc allows at most 32 MB, and
+    a tile's arrays have 200. Other C libraries lack these settings, and nothing changes there. See
     also `release_freed_memory`.
 
     Reference: https://www.gnu.org/software/libc/manual/html_node/Malloc-Tunable-Parameters.html
