@@ -75,6 +75,11 @@ def test_a_missing_input_is_reported_before_a_large_library_is_imported(words: l
     assert _roots_after(FAIL.format(words=words)) & LARGE == set()
 
 
+def test_doctor_imports_no_large_library() -> None:
+    code = 'from stereocell.cli.__main__ import main\nmain(["doctor"])'
+    assert _roots_after(code) & LARGE == set()
+
+
 @pytest.mark.parametrize(
     ("module", "unneeded"),
     [

@@ -100,9 +100,26 @@ def container_cores(root: Path = Path("/")) -> float:
 def available_bytes() -> int:
     """Return the free memory in bytes, of the machine or of the container."""
     import psutil
-    from distributed.system import memory_limit
 
-    return int(min(psutil.virtual_memory().available, memory_limit()))
+    return int(min(psutil.virtual_memory().available, container_bytes()))
+
+
+def container_bytes(root: Path = Path("/")) -> float:
+    """Return the bytes of memory that the container may use; infinity: no limit.
+
+    root  root of the file system
+
+    `distributed.system.memory_limit` returns the same, but its import takes half a second.
+    """
+    found = []
+    for name in (
+        "memory.max",
+        "memory.high",
+        "memory/memory.limit_in_bytes",
+    ):  # the last: version 1
+        with suppress(OSError, ValueError):  # ValueError for `max`, which means no limit
+            found.append(int((root / "sys/fs/cgroup" / name).read_text("ascii")))
+    return min(found, default=math.inf)
 
 
 def address_limit() -> float:
