@@ -352,8 +352,8 @@ bench-live: setup-dev ## Time `stereocell view SOURCE`: first picture, its colou
 	$(BIN)/python tests/bench/live_view.py
 	$(BIN)/python tests/bench/live_color.py
 
-bench-start: setup-dev ## Time the imports of a command and `stereocell --help`
-	$(BIN)/python tests/bench/start.py
+bench-start: setup-dev ## Time the start of each command, up to its help or a missing input
+	PYTHONPATH=tests $(BIN)/python tests/bench/start.py
 
 bench-size: setup-dev ## Measure the disk space of each requirement
 	$(BIN)/python tests/bench/install_size.py

@@ -25,12 +25,12 @@ from commands import call, make_sample, plan
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.isosurface.level_evidence import HALO, denoising_reach
+from stereocell.model.sample_boxes import sample_boxes
 from stereocell.model.tiling import Box, cut
 from stereocell.planning.plan_source import source_of
 from stereocell.planning.survey_steps import evidence_step, window_step
 from stereocell.steps.find_window import JOINT_VOXELS, SURVEY_VOXELS
 from stereocell.steps.open_source import open_afresh
-from stereocell.transfer.joint_histogram import sample_boxes
 from support.phantoms import write_ome_zarr
 
 REAL = (194, 512, 512)

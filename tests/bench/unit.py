@@ -43,7 +43,7 @@ from wrap import (
 )
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair, sum_components
 from stereocell.meshes.distance import Nearest, measure_spread
 from stereocell.meshes.validity import find_defects

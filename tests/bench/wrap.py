@@ -26,7 +26,8 @@ from stereocell.isosurface.array_levels import find_array_levels
 from stereocell.isosurface.components import find_components
 from stereocell.isosurface.distance_field import signed_distance
 from stereocell.isosurface.extract import extract_surface
-from stereocell.isosurface.repair import RepairOptions, repair
+from stereocell.isosurface.repair import repair
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.simplify_valid import simplify_without_defects

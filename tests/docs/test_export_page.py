@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from stereocell.export.write import ENDINGS
+from stereocell.export.endings import TAKES
 
 PAGE = Path(__file__).parents[2] / "docs" / "export-formats.md"
 
@@ -15,7 +15,7 @@ def test_the_table_of_endings_is_that_of_the_command() -> None:
     rows = text.partition("| ending |")[2].partition("\n\n")[0].splitlines()
     first_cells = [row.split("|")[1] for row in rows if row.startswith("|")]
     found = [ending for cell in first_cells for ending in re.findall(r"`(\.[\w.]+)`", cell)]
-    assert sorted(found) == sorted(ENDINGS)
+    assert sorted(found) == sorted(TAKES)
 
 
 def test_no_installed_viewer_reads_voxels_of_gltf() -> None:

@@ -48,7 +48,8 @@ def reaches() -> dict[str, set[Path]]:
         ("engine/run.py", set(), TILES | {"WriteStage", "WriteBundle", "WriteReport"}),
         ("textures/tangents.py", UNITS | {"WriteBundle"}, {"FindWindow", "WriteStage"}),
         ("meshes/simplify.py", UNITS | {"WriteBundle"}, {"FindWindow", "nifti"}),
-        ("filters/denoise.py", TILES, {"nifti"}),
+        ("filters/denoise.py", TILES - {"FindWindow"}, {"nifti"}),
+        ("filters/reach.py", TILES, {"nifti"}),
         ("isosurface/level_evidence.py", {"FindWindow", "GatherEvidence"}, {"BuildUnit"}),
         ("read/formats/ome_zarr/image.py", {"ome-zarr"}, TILES),
         ("read/formats/tiff/ome.py", {"tiff"}, TILES | {"dicom"}),
@@ -107,11 +108,11 @@ def test_make_lint_asks_for_a_version_where_a_constant_changed(tmp_path: Path) -
     for lock in step_record.LOCKS:
         shutil.copy2(lock, tmp_path)
     package = tmp_path / "pipeline" / PACKAGE.name
-    denoise = package / "filters" / "denoise.py"
+    reach = package / "filters" / "reach.py"
     constant = "SMOOTHING_REACH = 4.0"
-    text = denoise.read_text("utf-8")
+    text = reach.read_text("utf-8")
     assert text.count(constant) == 1
-    denoise.write_text(text.replace(constant, "SMOOTHING_REACH = 4.5"), encoding="utf-8")
+    reach.write_text(text.replace(constant, "SMOOTHING_REACH = 4.5"), encoding="utf-8")
     with (package / "objects" / "extents.py").open("a", encoding="utf-8") as file:
         file.write("# This comment is new.\n")
     done = subprocess.run(

@@ -15,8 +15,9 @@ import pytest
 from stereocell.cli.__main__ import main
 from stereocell.cli.flags import declare_export
 from stereocell.export import volume_files
+from stereocell.export.endings import PAGE, TAKES
 from stereocell.export.options import ExportOptions, parse_region
-from stereocell.export.write import FORMATS, PAGE_TAKES, export_stage
+from stereocell.export.write import FORMATS, export_stage
 from stereocell.model.errors import OutputError, UsageError
 from support.exhaustive import sweep
 
@@ -116,8 +117,8 @@ def test_parts_of_a_build_and_edits_are_not_overwritten(
 
 def test_options_of_all_endings_are_flags_of_the_command() -> None:
     known = {field.name for field in fields(ExportOptions)}
-    takes = (way.takes for way in FORMATS.values())
-    assert PAGE_TAKES.union(*takes) | {"channels"} == known
+    assert TAKES.keys() == {*FORMATS, PAGE}
+    assert frozenset[str]().union(*TAKES.values()) | {"channels"} == known
 
 
 def test_help_of_a_flag_names_all_endings_that_take_it() -> None:
@@ -127,7 +128,7 @@ def test_help_of_a_flag_names_all_endings_that_take_it() -> None:
     for action in parser._actions:
         named = set(re.findall(r"\.[a-z0-9]+", action.help or "")) & FORMATS.keys()
         if len(named) > 1:  # otherwise the help is about one format
-            takers = {one for one, way in FORMATS.items() if action.dest in way.takes}
+            takers = {one for one in FORMATS if action.dest in TAKES[one]}
             assert named == takers - {".nii.gz"}, action.dest
             listing.add(action.dest)
     assert listing == {"units", "unity", "width"}

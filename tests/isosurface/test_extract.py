@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stereocell.filters.denoise import SMOOTHING_REACH, smooth
+from stereocell.filters.denoise import smooth
+from stereocell.filters.reach import SMOOTHING_REACH
 from stereocell.isosurface.distance_field import gradient_magnitude, signed_distance
 from stereocell.isosurface.extract import extract_surface
-from stereocell.isosurface.repair import RepairOptions, repair
+from stereocell.isosurface.repair import repair
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.meshes.validity import find_defects
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh

@@ -5,7 +5,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.isosurface.repair import RepairOptions, repair
+from stereocell.isosurface.repair import repair
+from stereocell.isosurface.repair_options import RepairOptions
 
 SPACING = (1.0, 1.0, 1.0)
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from stereocell.isosurface.components import find_components
 from stereocell.isosurface.extract import extract_surface
-from stereocell.isosurface.repair import RepairOptions, repair
+from stereocell.isosurface.repair import repair
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.isosurface.repair_rules import sum_components
 from stereocell.model.lattice import Lattice
 from stereocell.model.tiling import Box

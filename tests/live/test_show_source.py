@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from stereocell.cli.__main__ import main
-from stereocell.live.show_source import is_source
+from stereocell.live.is_source import is_source
 from support.digests import digests_of
 from support.phantoms import f_phantom, write_ome_tiff
 from support.server.timeouts import connect

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.survey_file import read_survey
 from stereocell.cli.__main__ import main
+from stereocell.model.sample_boxes import sample_boxes
 from stereocell.planning.level_estimate import BLOCK, estimate_level
 from stereocell.planning.plan_notes import words_of_spacing
-from stereocell.transfer.joint_histogram import sample_boxes
 from support import phantoms
 
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from stereocell.isosurface.options import parse_level
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.model.channel import Appearance, SurfaceLevel
 from stereocell.planning.channels import MR_GREY, Channel, has_brain
 from stereocell.planning.settings import load, preset_names

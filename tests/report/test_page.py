@@ -20,9 +20,10 @@ from stereocell.model.errors import OutputError
 from stereocell.model.tiling import Box, Tile
 from stereocell.model.unit import Cover
 from stereocell.planning.channels import Channel
-from stereocell.report import charts, page, pictures, write_report
+from stereocell.report import charts, page, pictures
 from stereocell.report.facts import LodFacts, StepFacts, UnitFacts, gather, sum_up
 from stereocell.report.opening import find_opening
+from stereocell.report.page import write_report
 from stereocell.report.remarks import find_covers, find_remarks
 from stereocell.steps.unit_files import is_whole
 from support import phantoms

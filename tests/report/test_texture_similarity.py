@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from stereocell.isosurface.array_levels import find_array_levels
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Lod

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.formats.gltf_decode import DecodedMesh, read_glb
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tile_content import APRON

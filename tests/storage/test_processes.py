@@ -7,11 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import psutil
 import pytest
 from dask.system import cpu_count
+from distributed.system import memory_limit
 
 from stereocell.storage import processes
-from stereocell.storage.processes import container_cores, cores
+from stereocell.storage.processes import container_bytes, container_cores, cores
 
 
 def test_cores_are_counted_like_dask_counts_them() -> None:
@@ -49,6 +51,30 @@ def test_the_quota_is_that_of_the_container_s_group(
         file.write_text(text + "\n")
         file.with_name("cpu.cfs_period_us").write_text("100000\n")
     assert container_cores(tmp_path) == expected
+
+
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({}, math.inf),
+        ({"memory.max": "max", "memory.high": "max"}, math.inf),
+        ({"memory.max": "3000000", "memory.high": "max"}, 3e6),
+        ({"memory.max": "3000000", "memory.high": "2000000"}, 2e6),
+        ({"memory/memory.limit_in_bytes": "4000000"}, 4e6),
+    ],
+)
+def test_memory_is_bounded_by_the_container_s_group(
+    tmp_path: Path, files: dict[str, str], expected: float
+) -> None:
+    for name, text in files.items():
+        file = tmp_path / "sys/fs/cgroup" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text + "\n")
+    assert container_bytes(tmp_path) == expected
+
+
+def test_the_machine_s_memory_bounds_as_much_as_in_distributed() -> None:
+    assert min(psutil.virtual_memory().total, container_bytes()) == memory_limit()
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc has these settings")

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.planning import settings as settings_module
 from stereocell.planning.channels import Channel

@@ -19,7 +19,7 @@ import pytest
 from aiohttp import ClientTimeout
 
 from stereocell import read
-from stereocell.building import phases
+from stereocell.building import find_survey, phases
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.storage import location
@@ -63,13 +63,13 @@ def test_missing_source_is_named_and_the_build_goes_on_after_its_return(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     away, out = volume.with_name("away"), tmp_path / "out"
-    save = phases.save_survey
+    save = find_survey.save_survey
 
     def vanish(*arguments: Any) -> None:
         save(*arguments)
         volume.rename(away)
 
-    monkeypatch.setattr(phases, "save_survey", vanish)
+    monkeypatch.setattr(find_survey, "save_survey", vanish)
     assert make_assets(volume, out, GRID, "--workers", "0") == 1
     assert "f.ome.zarr: " in error_line(capsys)
     assert not list(out.rglob("unit.json"))
@@ -133,7 +133,7 @@ def test_a_read_only_out_is_named_and_the_build_goes_on_when_it_can_be_written(
 IN_THE_MIDDLE = """
 import os, signal, sys
 from pathlib import Path
-from stereocell.building import phases
+from stereocell.building import find_survey, phases
 from stereocell.engine import run as engine
 from stereocell.cli.__main__ import main
 

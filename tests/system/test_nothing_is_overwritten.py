@@ -10,7 +10,7 @@ import pytest
 from stereocell import samples
 from stereocell.cli.__main__ import main
 from stereocell.cli.places import PLACES
-from stereocell.export.write import ENDINGS
+from stereocell.export.endings import TAKES
 from support.digests import digests_of
 from support.error_lines import error_line
 from support.outputs import make_build, make_source
@@ -44,7 +44,7 @@ def _writing(name: str) -> dict[str, tuple[str, Given]]:
     if name == "export":
         return {
             f"export {ending}": (ending, lambda _, build, place: [name, build, place])
-            for ending in ENDINGS
+            for ending in TAKES
         }
     if name == "publish":
         return {name: ("", lambda _, build, place: [name, build, place])}
@@ -70,11 +70,11 @@ BEGINNINGS = (
     "building.tissue._learn",
     "steps.write_bundle.opened_stage",
     "export.write.Chosen",
-    "export.write.write_scene",
+    "export.export_build.write_scene",
     "preview.iso_value.window_step",
     "preview.png_slices.cut_planes",
     "publish.publish._require_whole",
-    "report.phase.write_report",
+    "report.page.write_report",
     "samples.brain_cells.replacing",
     "samples.cells.make_tissue",
     "samples.cycif.grow_tissue",

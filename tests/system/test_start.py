@@ -6,6 +6,33 @@ import sys
 
 import pytest
 
+from stereocell.cli.__main__ import COMMANDS
+from support.missing_inputs import MISSING_INPUTS
+
+# Libraries that take long to import. A command needs them only once it has found its input.
+LARGE = {
+    "distributed",
+    "h5py",
+    "imagecodecs",
+    "matplotlib",
+    "nibabel",
+    "numba",
+    "OpenEXR",
+    "pandas",
+    "PIL",
+    "pxr",
+    "pydicom",
+    "scipy",
+    "skimage",
+    "sklearn",
+    "vtkmodules",
+    "zarr",
+}
+WITHOUT_INPUT = {"sample", "doctor", "settings"}
+FAIL = """
+from stereocell.cli.__main__ import main
+assert main({words}) == 1
+"""
 # Allowed besides the standard library and modules that installed packages load into each process
 OURS = {"stereocell", "__main__", "_distutils_hack", "sitecustomize", "usercustomize"}
 HELP = """
@@ -39,11 +66,43 @@ def test_a_start_imports_no_library(code: str, most: int | None) -> None:
     assert most is None or len(modules) <= most
 
 
-def test_a_plan_waits_for_no_library_of_later_phases() -> None:
-    code = "import stereocell.building.phases"
+def test_every_command_with_an_input_is_tried() -> None:
+    assert {words[0] for words in MISSING_INPUTS.values()} == COMMANDS.keys() - WITHOUT_INPUT
+
+
+@pytest.mark.parametrize("words", MISSING_INPUTS.values(), ids=MISSING_INPUTS)
+def test_a_missing_input_is_reported_before_a_large_library_is_imported(words: list[str]) -> None:
+    assert _roots_after(FAIL.format(words=words)) & LARGE == set()
+
+
+def test_doctor_imports_no_large_library() -> None:
+    code = 'from stereocell.cli.__main__ import main\nmain(["doctor"])'
+    assert _roots_after(code) & LARGE == set()
+
+
+@pytest.mark.parametrize(
+    ("module", "unneeded"),
+    [
+        ("building.phases", LARGE),
+        ("export.export_build", LARGE),
+        ("export.write", {"nibabel", "pydicom", "skimage", "sklearn", "distributed"}),
+        ("live.is_source", LARGE),
+        ("planning.plan", LARGE),
+        ("report.page", {"pxr", "skimage", "nibabel", "OpenEXR"}),
+        ("serve.server", LARGE - {"PIL"}),
+        ("transfer.opacity", LARGE),
+        ("verify.formats", LARGE),
+    ],
+)
+def test_a_module_imports_no_library_that_few_of_its_users_need(
+    module: str, unneeded: set[str]
+) -> None:
+    assert _roots_after(f"import stereocell.{module}") & unneeded == set()
+
+
+def _roots_after(code: str) -> set[str]:
+    """Return the names of all packages that a new process has imported after this code."""
     done = subprocess.run(
         [sys.executable, "-c", code + TELL], capture_output=True, text=True, check=True
     )
-    roots = {name.partition(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
-    assert "numpy" in roots
-    assert roots & {"pxr", "igl", "zarr", "vtkmodules", "OpenEXR"} == set()
+    return {name.partition(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}

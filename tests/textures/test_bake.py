@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.meshes.simplify import simplify
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField

@@ -6,6 +6,7 @@ from scipy import ndimage
 from scipy.special import erfinv
 from scipy.stats import norm
 
+from stereocell.model.sample_boxes import sample_boxes
 from stereocell.model.tiling import Box
 from stereocell.transfer.joint_histogram import (
     COLUMNS,
@@ -17,7 +18,6 @@ from stereocell.transfer.joint_histogram import (
     find_steps,
     log_scaled,
     rebin,
-    sample_boxes,
     to_eight_bits,
 )
 

@@ -3,32 +3,13 @@
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.own_parts import no_layer
 from stereocell.building.phase import states_of
 from stereocell.bundle.manifest import MANIFEST
 from stereocell.steps.write_bundle import WriteBundle
-from stereocell.textures.map_packages import encoder_version, require_map_packages
+from stereocell.textures.map_packages import encoder_version
 from stereocell.usd import written_files
 from stereocell.usd.stage_files import dependencies, may_be_image
 from stereocell.usd.write_previews import PREVIEWS
-
-
-def require_stage(out_folder: OutFolder, layer: Path | None) -> Path:
-    """Return the path of the stage to export.
-
-    layer  layer named by --stage; None: OUT's own stage
-
-    Raises OutputError if the stage is missing or unfinished.
-    """
-    out_folder.require_finished("stage")
-    if out_folder.has(out_folder.plan_file):
-        plan = out_folder.plan()  # raises an error if the plan was changed by hand
-        if plan.settings.unwrap.maps:
-            require_map_packages()
-    path = layer if layer is not None else out_folder.stage_file
-    if not out_folder.has(path):
-        raise no_layer(path, is_given=layer is not None)
-    return path
 
 
 def require_kept_stage(out_folder: OutFolder) -> None:

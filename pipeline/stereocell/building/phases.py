@@ -4,52 +4,36 @@ Before the units, passes find values that all tiles of a channel share: windows 
 levels -> components. Each phase is a function on OUT and skips finished work, because the name of a
 result is a key of everything that the result depends on.
 
-A phase imports its steps when it runs, because their libraries are slow to import. A plan, for
-example, needs no USD.
+A phase imports its steps once it has read its inputs, because their libraries are slow to import.
+So a command reports a missing input at once, and a plan needs no USD.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from stereocell.building.object_records import save_notes, table_of_objects
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.own_parts import (
-    require_own_places,
-)
-from stereocell.building.passes import Passes
-from stereocell.building.phase import Phase, phase_of
+from stereocell.building.own_parts import require_own_places
+from stereocell.building.phase import phase_of
 from stereocell.building.replaced_plan import replace_plan, replaced_plan, require_own_settings
+from stereocell.building.required_stage import require_stage
 from stereocell.building.running_pass import remove_mixed
-from stereocell.building.surface_cover import notes_on_cover
-from stereocell.building.survey_file import read_survey, save_survey
 from stereocell.bundle.manifest import require_bundle
 from stereocell.engine.run import Engine, console
 from stereocell.engine.run_steps import Kept, run_missing
-from stereocell.planning.channel_survey import (
-    choose_level_of,
-    notes_on_holders,
-    notes_on_survey,
-    survey_channel,
-)
-from stereocell.planning.covering_channels import leave_out_covering
 from stereocell.planning.input_files import require_table
-from stereocell.planning.label_numbers import notes_on_objects
-from stereocell.planning.level_choice import find_level
-from stereocell.planning.level_estimate import notes_on_levels
 from stereocell.planning.plan import Plan
 from stereocell.planning.plan_notes import changes_of, print_notes, summary_of
 from stereocell.planning.provenance import provenance_record
 from stereocell.planning.settings import Settings, to_readable_toml
 from stereocell.planning.settle import settle
-from stereocell.planning.survey import Survey
 from stereocell.read.image import printable
 from stereocell.read.source_place import require_apart
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.overwriting import is_forced
 from stereocell.storage.sealed_text import write_sealed_text
-from stereocell.usd.written_files import describe_parts, read_stage_list
+from stereocell.usd.written_files import USDZ_NAME, describe_parts, read_stage_list
 
 
 def make_plan(
@@ -78,6 +62,8 @@ def make_plan(
         if engine is not None:
             require_own_places(out_folder, is_same_plan=True)  # fails before the input is read
         plan = settle(source, settings, choice, title=title)
+        from stereocell.planning.level_estimate import notes_on_levels
+
         plan = replace(plan, notes=(*plan.notes, *notes_on_levels(plan)))
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()
@@ -103,16 +89,21 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
 
     Raises SourceError if the source changed since the plan, TasksFailedError if units fail.
     """
+    out_folder = OutFolder(out)
+    plan = out_folder.plan()
+    from stereocell.building.find_survey import find_survey
+    from stereocell.building.object_records import save_notes
+    from stereocell.building.passes import Passes
+    from stereocell.building.surface_cover import notes_on_cover
+    from stereocell.planning.label_numbers import notes_on_objects
     from stereocell.planning.object_steps import object_steps
     from stereocell.planning.unit_steps import choose_units, longest_first, unit_steps
 
-    out_folder = OutFolder(out)
-    plan = out_folder.plan()
     with phase_of(out_folder, "units") as phase:
         remove_mixed(out_folder, plan)
         wanted = choose_units(plan, only)
         passes = Passes(out_folder, plan, engine)
-        survey = _survey(passes, phase)
+        survey = find_survey(passes, phase)
         for labels in plan.labels:
             save_notes(out_folder, plan, labels)
         located = {labels.id: passes.objects(labels) for labels in plan.labels}
@@ -141,30 +132,6 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
     require_table(plan.settings.objects.table)
 
 
-def _survey(passes: Passes, phase: Phase) -> Survey:
-    """Find the window, level, repair and appearance of each channel, the same for all tiles."""
-    plan = passes.plan
-    found_windows = passes.windows()
-    windows, files = dict(found_windows), found_windows.files()
-    phase.print(*notes_on_holders(plan, windows))
-    evidence = passes.evidence(windows)
-    found = {
-        one.id: find_level(plan, one, windows[one.id], evidence[one.id]) for one in plan.channels
-    }
-    components = passes.components(found)
-    chosen = {
-        id_: choose_level_of(plan, one, evidence[id_], [level[id_] for level in components])
-        for id_, one in found.items()
-    }
-    chosen = leave_out_covering(plan, chosen)
-    survey = {
-        one.id: survey_channel(plan, one, chosen[one.id], files[one.id]) for one in plan.channels
-    }
-    save_survey(passes.out_folder, survey)
-    phase.print(*notes_on_survey(plan, survey, chosen))
-    return survey
-
-
 def run_stage(out: Path, engine: Engine) -> None:
     """Write OUT/stage from the units.
 
@@ -173,11 +140,13 @@ def run_stage(out: Path, engine: Engine) -> None:
 
     Raises OutputError if units are missing or damaged, TasksFailedError if tiles fail.
     """
-    from stereocell.planning.stage_steps import stage_step, stage_tile_step
-    from stereocell.usd.write_usdz import USDZ_NAME
-
     out_folder = OutFolder(out)
     plan = out_folder.plan()
+    from stereocell.building.object_records import table_of_objects
+    from stereocell.building.passes import Passes
+    from stereocell.building.survey_file import read_survey
+    from stereocell.planning.stage_steps import stage_step, stage_tile_step
+
     with phase_of(out_folder, "stage") as phase:
         out_folder.require_units_of(plan)
         survey, stage_dir = read_survey(out_folder), out_folder.stage_dir
@@ -233,12 +202,12 @@ def run_bundle(
 
     Raises OutputError if the stage is missing, StageError if it can't be read.
     """
-    from stereocell.building import bundle_inputs
-    from stereocell.steps.write_bundle import bundle_part_tasks, opened_stage, write_bundle
-
     out_folder = OutFolder(out)
     with phase_of(out_folder, "bundle") as phase:
-        path = bundle_inputs.require_stage(out_folder, stage)
+        path = require_stage(out_folder, stage)
+        from stereocell.building import bundle_inputs
+        from stereocell.steps.write_bundle import bundle_part_tasks, opened_stage, write_bundle
+
         viewer = viewer_dist()
         step = bundle_inputs.bundle_step(out_folder, path, viewer)
         bundle_inputs.require_kept_stage(out_folder)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.storage.file_list import measure
-from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
-from stereocell.usd.written_files import AsWritten
+from stereocell.usd.write_usdz import write_usdz
+from stereocell.usd.written_files import USDZ_NAME, AsWritten
 
 MAX_USDZ_BYTES = 20 * 2**20  # bytes, largest specimen.usdz
 NO_SURFACE = "no surface is drawn"

@@ -129,7 +129,7 @@ def _run(options: argparse.Namespace) -> int:
     if name in SHOWERS and commands.is_inbox(options):
         return commands.answer(options, commands.serve_inbox(options))
     if name in SHOWERS:
-        from stereocell.live.show_source import is_source
+        from stereocell.live.is_source import is_source
 
         options.is_source = is_source(options.out)
     if name not in LIGHT:

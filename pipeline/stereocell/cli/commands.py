@@ -127,6 +127,14 @@ def _series(options: argparse.Namespace) -> Answer | None:
     return Answer({"series": list(lines)})
 
 
+def _require_found(source: str) -> None:
+    """Raise SourceError for a missing path, before large libraries are imported."""
+    from stereocell.read.readers import require_found
+    from stereocell.storage.location import Location
+
+    require_found(Location.of(source))
+
+
 def plan(options: argparse.Namespace) -> Answer:
     """Write the plan and print it."""
     return _series(options) or _plan(options, None)
@@ -159,6 +167,7 @@ def iso(options: argparse.Namespace) -> Answer:
     """Write a picture of one tile's iso-values, and print them."""
     if listed := _series(options):
         return listed
+    _require_found(options.input)
     from stereocell.planning.preset_choice import load_for, print_choice
     from stereocell.preview import iso_value as iso_preview
 
@@ -259,6 +268,7 @@ def slices(options: argparse.Namespace) -> Answer:
     """Write PNG slices of one channel."""
     if listed := _series(options):
         return listed
+    _require_found(options.input)
     from stereocell.planning.plan_notes import print_notes
     from stereocell.planning.preset_choice import load_for
     from stereocell.planning.settle import settle
@@ -308,6 +318,12 @@ def sample(options: argparse.Namespace) -> Answer:
 
 def tissue(options: argparse.Namespace) -> Answer:
     """Learn tissue classes and build their channels."""
+    from stereocell.building.out_folder import OutFolder
+    from stereocell.building.sealed_documents import require_documents
+
+    out_folder = OutFolder(options.out)
+    require_documents(out_folder, "tissue")
+    out_folder.plan()  # a missing plan is reported before large libraries are imported
     from stereocell.building.model_process import ModelBounds
     from stereocell.building.tissue import TissueRequest, add_tissue, parse_classes
 
@@ -350,8 +366,8 @@ def export(options: argparse.Namespace) -> Answer:
     from dataclasses import fields
 
     from stereocell.engine.run import console
+    from stereocell.export.export_build import export as write
     from stereocell.export.options import ExportOptions, parse_region
-    from stereocell.export.write import export as write
 
     given: dict[str, Any] = {
         field.name: getattr(options, field.name, None) for field in fields(ExportOptions)
@@ -523,11 +539,12 @@ def _require_no_source_flags(options: argparse.Namespace) -> None:
 
 def _show_source(options: argparse.Namespace, run: "Callable[[Path, Live | None], None]") -> None:
     """Serve the first view of a source, and build the source meanwhile."""
+    source = str(options.out)
+    _require_found(source)
     from stereocell.cli.build_behind import build_behind
     from stereocell.live.show_source import Behind, show_source
     from stereocell.planning.preset_choice import load_for
 
-    source = str(options.out)
     wanted, choice = load_for(source, options.preset, options.config, flags=flags_of(options))
 
     def serve_live(live: "Live") -> None:

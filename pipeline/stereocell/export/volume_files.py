@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import nibabel
 import numpy as np
 
 from stereocell.export.chosen import Chosen
@@ -70,6 +69,8 @@ def write_nifti(chosen: Chosen, path: Path, _: int) -> str:
     voxels = values.transpose(3, 2, 1, 0)
     voxels = voxels if len(layout.channels) > 1 else voxels[..., 0]
     affine = _LPS_TO_RAS @ grid.affine
+    import nibabel  # slow to import
+
     image = nibabel.Nifti1Image(voxels, affine, dtype=layout.dtype)  # type: ignore[no-untyped-call]
     code = "scanner" if grid.is_patient else "aligned"
     image.set_sform(affine, code)  # type: ignore[no-untyped-call]

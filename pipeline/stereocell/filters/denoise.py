@@ -16,22 +16,15 @@ them, but also a third of the thin bone in a CT scan with voxels of 3 mm.
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.filters.reach import SMOOTHING_REACH, median_reach
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.model.image_plane import (
-    MAX_RATIO,
-    back_of_three,
     first_of_three,
     in_order,
     slices_back,
     slices_first,
 )
-from stereocell.model.spacing import Spacing
 from stereocell.model.volume import Volume
-
-# Voxels to each side; the clip of hot voxels looks at neighbours within this distance
-HOT_VOXEL_REACH = 1
-MEDIAN_REACH = 1  # voxels to each side in the plane of the images that the median uses
-SMOOTHING_REACH = 4.0  # radius of the Gaussian, in sigmas
 
 
 def denoise(volume: Volume, sigma_um: float, max_shift: float | None = None) -> NDArray[np.float32]:
@@ -79,19 +72,6 @@ def _filtered(
         bound = np.float32(np.inf if max_shift is None else max_shift)
         smooth_in_place(field, across, rows, columns, has_median, bound)
     return field
-
-
-def median_reach(spacing_um: Spacing, slice_axis: int) -> tuple[int, int, int]:
-    """Return how many voxels (z, y, x) the median reaches to each side; 0, 0, 0: no median."""
-    _, row, column = first_of_three(spacing_um, slice_axis)
-    reach = MEDIAN_REACH if max(row, column) <= MAX_RATIO * min(row, column) else 0
-    return back_of_three((0, reach, reach), slice_axis)
-
-
-def median_size(spacing_um: Spacing, slice_axis: int) -> tuple[int, int, int]:
-    """Return the size (z, y, x) of the median in voxels; 1, 1, 1: no median."""
-    z, y, x = (2 * reach + 1 for reach in median_reach(spacing_um, slice_axis))
-    return z, y, x
 
 
 def gaussian(sigma: float) -> NDArray[np.float64]:

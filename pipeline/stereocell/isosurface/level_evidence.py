@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.filters.boxes import dilate, erode
-from stereocell.filters.denoise import SMOOTHING_REACH, median_reach
+from stereocell.filters.reach import SMOOTHING_REACH, median_reach
 from stereocell.isosurface.axis_profiles import Profiles
 from stereocell.isosurface.distance_field import gradient_magnitude
 from stereocell.isosurface.edge_criteria import EdgeSums, gather_edges

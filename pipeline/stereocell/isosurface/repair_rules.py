@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from stereocell.filters.boxes import dilate
 from stereocell.isosurface.components import Components, find_components
 from stereocell.isosurface.options import SurfaceOptions
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.isosurface.thin_structures import count_thin
 from stereocell.model.lattice import Step
 from stereocell.model.settings import AUTO

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stereocell.engine.run_steps import Results
-from stereocell.filters.denoise import median_size
+from stereocell.filters.reach import median_size
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.level_evidence import TileEvidence
 from stereocell.isosurface.repair_rules import choose_repair

@@ -26,6 +26,7 @@ from stereocell.isosurface.level_evidence import (
 from stereocell.isosurface.level_histogram import Scale
 from stereocell.model.counted import counted
 from stereocell.model.image_plane import back_of_three, first_of_three, slices_back, slices_first
+from stereocell.model.sample_boxes import sample_boxes
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 from stereocell.planning.channels import Channel
@@ -38,7 +39,6 @@ from stereocell.steps.find_window import Window
 from stereocell.steps.gather_evidence import evidence_of
 from stereocell.steps.open_source import open_source
 from stereocell.transfer.channel_statistics import find_statistics
-from stereocell.transfer.joint_histogram import sample_boxes
 
 # Share of the voxels of all channels that is read, and its bounds in voxels. In cells, brains and
 # heads the levels of the blocks were within 15 % of those of all voxels, and confidences within

@@ -10,8 +10,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Protocol
 
-from stereocell.filters.denoise import SMOOTHING_REACH
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.filters.reach import SMOOTHING_REACH
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.lattice import CAP
 from stereocell.model.rigid_transform import IDENTITY, Matrix

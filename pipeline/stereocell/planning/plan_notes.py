@@ -7,6 +7,7 @@ from stereocell.engine.run import console
 from stereocell.isosurface.options import LEVEL_NAMES, LEVELS, NO_SURFACE
 from stereocell.model.counted import counted
 from stereocell.model.errors import SourceError
+from stereocell.model.sample_boxes import sample_boxes
 from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 from stereocell.planning.channels import ALL, Channel
@@ -17,7 +18,6 @@ from stereocell.planning.settings import Settings, to_dict
 from stereocell.read import Dataset
 from stereocell.read.absent_chunks import count_absent
 from stereocell.steps.open_source import SourceRef
-from stereocell.transfer.joint_histogram import sample_boxes
 
 _MAX_CHANGES = 4  # most changed settings in one line
 _BODY_UM = 100.0  # um; voxel spacings of at least this are printed in mm

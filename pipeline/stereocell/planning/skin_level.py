@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.isosurface.array_levels import find_array_levels
 from stereocell.model.volume import Volume
 
 BASIS_OF_AIR = "half-way between the air, which the window cut off, and the dimmest tissue"
@@ -35,6 +34,8 @@ def find_skin_level(volume: Volume) -> tuple[float, str]:
         tissue = voxels[voxels > beyond]
         if tissue.size:
             return (darkest + float(np.quantile(tissue, _DIMMEST))) / 2.0, BASIS_OF_AIR
+    from stereocell.isosurface.array_levels import find_array_levels  # slow to import
+
     clear = find_array_levels(volume, modality="CT").levels.clear
     if clear:
         return float(clear[0].value), BASIS_OF_LEVEL

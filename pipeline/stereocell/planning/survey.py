@@ -13,7 +13,7 @@ from pydantic import AliasChoices, Field, TypeAdapter
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.level import Level
 from stereocell.isosurface.near_levels import ABOVE_BACKGROUND, MARK, find_near_levels, words_of
-from stereocell.isosurface.repair import RepairOptions
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.model.channel import Appearance
 from stereocell.planning.plan import Plan
 from stereocell.transfer.channel_statistics import ChannelStatistics

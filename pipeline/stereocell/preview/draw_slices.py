@@ -18,7 +18,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from stereocell.filters.denoise import SMOOTHING_REACH, smooth
+from stereocell.filters.denoise import smooth
+from stereocell.filters.reach import SMOOTHING_REACH
 from stereocell.model.mesh import Mesh
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tiling import Box

@@ -45,9 +45,8 @@ def read_image(
     return format.open(location, **given)
 
 
-def find_reader(source: str | Path) -> tuple[Location, Format]:
-    """Return the place and the format of a source. Raises SourceError where there is none."""
-    location = Location.of(source)
+def require_found(location: Location) -> None:
+    """Raise SourceError if a path of this machine does not exist."""
     if location.is_local and not Path(location.path).exists():
         if os.path.islink(location.path):
             target = os.readlink(location.path)
@@ -56,6 +55,12 @@ def find_reader(source: str | Path) -> tuple[Location, Format]:
                 "expected a file or a folder"
             )
         raise SourceError(f"{location.shown}: not found, expected a file or a folder")
+
+
+def find_reader(source: str | Path) -> tuple[Location, Format]:
+    """Return the place and the format of a source. Raises SourceError where there is none."""
+    location = Location.of(source)
+    require_found(location)
     if location.is_local and not Path(location.path).is_dir():
         require_own(location.path, [location.folder], named=location.shown)
     if location.is_local and (words := foreign_words(location.path, only_other=True)):

@@ -11,7 +11,6 @@ from stereocell.building.phase import phase_of
 from stereocell.engine.run import Engine
 from stereocell.engine.step import Keyed
 from stereocell.planning.provenance import provenance_record
-from stereocell.report.page import TEMPLATE, write_report
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +42,8 @@ def run_report(out: Path, engine: Engine, *, texture_similarity: bool = False) -
     with phase_of(out_folder, "report") as phase:
         plan = out_folder.plan()
         out_folder.require_units_of(plan)
+        from stereocell.report.page import TEMPLATE, write_report  # slow to import
+
         others = {
             name: {field: value for field, value in entry.items() if field != FIELD}
             for name, entry in out_folder.phases().items()

@@ -21,8 +21,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
-from skimage.metrics import structural_similarity
 
 from stereocell.model.mesh import Lod
 from stereocell.textures.rasterize import Seen
@@ -122,6 +120,8 @@ def sample(image: NDArray[np.uint8], uvs: NDArray[np.float64]) -> NDArray[np.flo
 
     Row 0 of the image lies at v = 1.
     """
+    from scipy import ndimage  # slow to import, and few reports compare textures
+
     height, width = image.shape
     place = [(1 - uvs[:, 1]) * height - 0.5, uvs[:, 0] * width - 0.5]
     found: NDArray[np.float64] = ndimage.map_coordinates(
@@ -132,6 +132,8 @@ def sample(image: NDArray[np.uint8], uvs: NDArray[np.float64]) -> NDArray[np.flo
 
 def compare(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Return the mean SSIM of two pictures of values 0..1, each float64 (height, width)."""
+    from skimage.metrics import structural_similarity  # slow to import
+
     # The paper has a Gaussian window of 11 x 11 pixels and variances of the population.
     return float(
         structural_similarity(

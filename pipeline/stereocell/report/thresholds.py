@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
-from skimage import filters
 
 from stereocell.report import charts
 from stereocell.transfer.adaptive_threshold import Histogram, Threshold
@@ -99,6 +98,8 @@ def describe(found: Threshold) -> str:
 
 def find_peers(histogram: Histogram) -> tuple[float, float]:
     """Return Otsu's and Li's thresholds as voxel values. At least two bins must have counts."""
+    from skimage import filters  # slow to import
+
     counts, levels = np.asarray(histogram.counts), histogram.levels
     otsu = filters.threshold_otsu(hist=(counts, levels))
     fewer = np.ceil(counts * min(1.0, _LI_VOXELS / counts.sum())).astype(np.int64)

@@ -4,18 +4,20 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from starlette.applications import Starlette
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp
 
-from stereocell.live.show_source import Live
 from stereocell.serve.access import Access, Gate
 from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.brick_session import BrickEndpoint
-from stereocell.serve.live_app import LiveApp
 from stereocell.serve.measured_values import VALUES_HEADER, MeasuredValues
 from stereocell.serve.static_files import BundleFiles, bricks_header
+
+if TYPE_CHECKING:
+    from stereocell.live.show_source import Live
 
 
 def make_app(
@@ -26,7 +28,7 @@ def make_app(
     names: tuple[str, ...],
     gate: Gate | None,
     frames: tuple[str, ...] = (),
-    live: Live | None = None,
+    live: "Live | None" = None,
 ) -> ASGIApp:
     """Return the application: the bundle's files, `/bricks` and `/values`.
 
@@ -38,8 +40,11 @@ def make_app(
     live     a source whose first view is the bundle (see `serve.server.serve`); None if the bundle
              is finished
     """
-    app = bundle_app(bundle, library, stage) if live is None else LiveApp(live, built_app)
-    return Access(app, names, gate, frames)
+    if live is None:
+        return Access(bundle_app(bundle, library, stage), names, gate, frames)
+    from stereocell.serve.live_app import LiveApp  # slow to import, and a build does not need it
+
+    return Access(LiveApp(live, built_app), names, gate, frames)
 
 
 def built_app(bundle: Path) -> ASGIApp:

@@ -11,19 +11,21 @@ import math
 from collections import OrderedDict
 from pathlib import Path
 from threading import Lock
+from typing import TYPE_CHECKING
 
 import anyio.to_thread
 import numpy as np
 from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 
-from stereocell.formats.vdb import MEASURED_NAME
-from stereocell.formats.vdb_read import VdbValues
 from stereocell.model.errors import StereoCellError
 from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.headers import policy
 from stereocell.serve.tree_files import Volume
 from stereocell.storage.file_list import find_faults, read_list
+
+if TYPE_CHECKING:
+    from stereocell.formats.vdb_read import VdbValues
 
 VALUES_HEADER = {"Stereocell-Values": "version=1"}  # announces /values to a page
 _LIST = "files.json"  # the stage's list of files
@@ -63,7 +65,7 @@ class MeasuredValues:
         # Converting through text gives the shortest number that rounds to this float32.
         return None if found is None or not np.isfinite(found) else float(str(found))
 
-    def _open(self, volume: Volume) -> VdbValues | None:
+    def _open(self, volume: Volume) -> "VdbValues | None":
         """Return the voxels from which a volume was made; None if the stage has them no longer."""
         named = volume.entry.get("measured")
         if named is None:
@@ -76,6 +78,10 @@ class MeasuredValues:
         listed = read_list(self._stage / _LIST, "").get(path)
         if listed != named or find_faults(self._stage, {path: named}, since=self._stage / _LIST):
             return None
+        # slow to import, and few pages ask for values
+        from stereocell.formats.vdb import MEASURED_NAME
+        from stereocell.formats.vdb_read import VdbValues
+
         values = VdbValues(self._stage / path, MEASURED_NAME)
         self._files[key] = named["sha256"], values
         if len(self._files) > _OPEN_FILES:

@@ -23,12 +23,12 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import uvicorn
 from starlette.types import ASGIApp
 
 from stereocell.bundle.manifest import MANIFEST, read_manifest
-from stereocell.live.show_source import Live
 from stereocell.model.errors import StereoCellError
 from stereocell.serve.access import Gate
 from stereocell.serve.brick_library import BrickLibrary
@@ -39,6 +39,9 @@ from stereocell.serve.lifetime import Lifetime
 from stereocell.serve.limits import MESSAGE_BYTES, STOP_S
 from stereocell.serve.static_files import ShrunkError
 from stereocell.serve.websocket_protocol import GuardedSocket
+
+if TYPE_CHECKING:
+    from stereocell.live.show_source import Live
 
 LOCALHOST = "127.0.0.1"
 _OWN_NAMES = (LOCALHOST, "localhost")  # hosts; any port is accepted, since a tunnel may change it
@@ -52,7 +55,7 @@ def serve(
     open_browser: bool,
     for_program: bool = False,
     frames: tuple[str, ...] = (),
-    live: Live | None = None,
+    live: "Live | None" = None,
 ) -> None:
     """Serve OUT/bundle until Ctrl+C or SIGTERM. OUT may be a bundle. Port 0 takes any free port.
 
@@ -225,7 +228,7 @@ class BundleServer(Server):
         lan: bool,
         for_program: bool = False,
         frames: tuple[str, ...] = (),
-        live: Live | None = None,
+        live: "Live | None" = None,
     ) -> None:
         """Raises StereoCellError if there is no bundle or network, or the port is taken."""
         bundle, bricks = _places(out) if live is None else (live.bundle, None)
@@ -263,7 +266,7 @@ class BundleServer(Server):
             shown += " (a bundle without its build: volumes are sent whole)"
         self.introduce_as(shown, {"bundle": str(self.bundle), "bricks": self.has_bricks})
 
-    def _introduce_source(self, live: Live) -> None:
+    def _introduce_source(self, live: "Live") -> None:
         about: dict[str, object] = {"bricks": live.fine is not None}
         if live.build is None:
             self.introduce_as("the source without building it", about)

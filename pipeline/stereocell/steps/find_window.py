@@ -22,6 +22,7 @@ from stereocell.isosurface.level_evidence import (
 )
 from stereocell.isosurface.level_histogram import Scale
 from stereocell.model.image_plane import back_of_three, first_of_three, slices_back, slices_first
+from stereocell.model.sample_boxes import SAMPLE_EDGE, sample_boxes
 from stereocell.model.tiling import Box
 from stereocell.read import Dataset
 from stereocell.steps.open_source import Voxels, open_source
@@ -32,10 +33,8 @@ from stereocell.transfer.channel_statistics import ChannelStatistics, find_stati
 from stereocell.transfer.joint_histogram import (
     COLUMNS,
     FINE_ROWS,
-    SAMPLE_EDGE,
     STEEPEST,
     count_joint,
-    sample_boxes,
     to_eight_bits,
 )
 from stereocell.transfer.options import WindowOptions

@@ -15,7 +15,8 @@ from stereocell.isosurface.cover import measure_cover
 from stereocell.isosurface.distance_field import to_distance
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.holder import Holder
-from stereocell.isosurface.repair import Repaired, RepairOptions, repair
+from stereocell.isosurface.repair import Repaired, repair
+from stereocell.isosurface.repair_options import RepairOptions
 from stereocell.meshes.alpha_wrap import alpha_wrap
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.rims import thin_rims

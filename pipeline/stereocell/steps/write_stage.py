@@ -15,12 +15,13 @@ from stereocell.steps.write_stage_tile import WriteStageTile, digest_of_table
 from stereocell.storage.file_list import FileList
 from stereocell.usd.write_previews import PREVIEWS, write_previews
 from stereocell.usd.write_stage import TileExtent, write_stage
-from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
+from stereocell.usd.write_usdz import write_usdz
 from stereocell.usd.written_files import (
     CONTENTS_NAME,
     DISPLAY_NAME,
     NVINDEX_NAME,
     STAGE_NAME,
+    USDZ_NAME,
     AsWritten,
     write_list,
 )

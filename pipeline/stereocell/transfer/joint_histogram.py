@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from stereocell.filters.codes import codes_of, every_code, has_codes
 from stereocell.kernels.value_counts import count_steps, look_up, measure_steps
 from stereocell.model.spacing import Spacing
-from stereocell.model.tiling import Box
 
 ROWS, COLUMNS = 64, 256  # gradient magnitudes, and values of 8 bits
 STEEPEST = 3**0.5  # the largest possible step: the whole window along each axis
@@ -28,7 +27,6 @@ STEEPEST = 3**0.5  # the largest possible step: the whole window along each axis
 FINE_ROWS = 1024
 ENERGY_SHARE = 0.995  # share of the squared steps that lies below gradient_max
 SMALLEST_MAX = 0.05  # share of the window, 13 steps of 8 bits; finer rows would not differ
-SAMPLE_EDGE = (16, 128, 128)  # voxels (z, y, x) of a block, if not all of a region is counted
 
 
 def find_steps(voxels: NDArray[np.uint8], spacing_um: Spacing) -> NDArray[np.float32]:
@@ -137,30 +135,3 @@ def _scaled(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uin
     low, high = window
     share = (voxels.astype(np.float32) - np.float32(low)) / np.float32(high - low)
     return np.rint(np.clip(share, 0, 1) * 255).astype(np.uint8)
-
-
-def sample_boxes(region: Box, limit: int, largest: tuple[int, int, int] = SAMPLE_EDGE) -> list[Box]:
-    """Return boxes of a region with at most about `limit` voxels: the whole region, or some blocks.
-
-    Blocks are spaced evenly along each axis, from end to end, as many as the limit allows.
-
-    largest  voxels (z, y, x) of a block
-    """
-    shape = region.shape
-    if np.prod(shape, dtype=np.int64) <= limit:
-        return [region]
-    edge = [min(n, e) for n, e in zip(shape, largest, strict=True)]
-    room = [n / e for n, e in zip(shape, edge, strict=True)]
-    wanted = limit / float(np.prod(edge, dtype=np.int64))
-    share = min(1.0, (wanted / float(np.prod(room))) ** (1 / 3))
-    counts = [max(1, int(r * share)) for r in room]
-    starts = [
-        np.rint(a + (np.arange(count) + 0.5) * n / count - e / 2).astype(int)
-        for a, n, e, count in zip(region.start, shape, edge, counts, strict=True)
-    ]
-    return [
-        Box((z, y, x), (z + edge[0], y + edge[1], x + edge[2]))
-        for z in map(int, starts[0])
-        for y in map(int, starts[1])
-        for x in map(int, starts[2])
-    ]

@@ -7,7 +7,6 @@ that a recoloured channel needs no new table.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from stereocell.model.channel import OpacityPoints
 
@@ -168,7 +167,7 @@ def _end_of_noise(below: NDArray[np.int64]) -> float:
     """
     if not below.any():
         return 0.0
-    smooth = ndimage.gaussian_filter1d(below.astype(np.float64), 2.0, mode="nearest")
+    smooth = _smoothed(below)
     mode = int(smooth.argmax())
     beyond_half = np.flatnonzero(smooth[mode:] <= smooth[mode] / 2)
     return mode + NOISE_REACH * float(beyond_half[0]) if beyond_half.size else 0.0
@@ -181,7 +180,7 @@ def _noise_beyond(below: NDArray[np.int64]) -> float:
 
     below  int64 (bins,), voxel counts below the surface
     """
-    smooth = ndimage.gaussian_filter1d(below.astype(np.float64), 2.0, mode="nearest")
+    smooth = _smoothed(below)
     last = len(below) - 1
     before = int(0.75 * last)
     peak = float(smooth.max(initial=0.0))
@@ -191,6 +190,16 @@ def _noise_beyond(below: NDArray[np.int64]) -> float:
     if fall < 1:
         return 0.0
     return float(np.log(smooth[last] / (FAINT * peak))) * (last - before) / fall
+
+
+def _smoothed(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return counts after a Gaussian of two bins; the counts at both ends are repeated."""
+    from scipy import ndimage  # slow to import, and only magnitudes need it
+
+    smooth: NDArray[np.float64] = ndimage.gaussian_filter1d(
+        counts.astype(np.float64), 2.0, mode="nearest"
+    )
+    return smooth
 
 
 def evaluate(points: OpacityPoints, *, size: int = 256) -> NDArray[np.float32]:

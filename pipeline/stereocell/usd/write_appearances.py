@@ -25,7 +25,7 @@ from typing import Any
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from stereocell.filters.denoise import HOT_VOXEL_REACH, SMOOTHING_REACH
+from stereocell.filters.reach import HOT_VOXEL_REACH, SMOOTHING_REACH
 from stereocell.formats.exr import write_lut
 from stereocell.model.channel import Appearance, OpacityPoints, Shapes, SurfaceLevel
 from stereocell.model.object_table import ObjectTable

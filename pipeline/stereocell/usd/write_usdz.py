@@ -43,7 +43,6 @@ from stereocell.usd.specimen import specimen_of
 from stereocell.usd.usdz_lights import copy_lights
 from stereocell.usd.written_files import AsWritten
 
-USDZ_NAME = "specimen.usdz"
 SIZE_M = 0.15  # m, longest edge of the specimen
 MAX_TRIANGLES = 200_000  # largest number of triangles of all meshes together
 

@@ -32,6 +32,7 @@ from stereocell.storage.workspace import cached, fetch, is_file
 FILES, STAGE_NAME, CONTENTS_NAME = "files.json", "stage.usda", "contents.usda"
 NVINDEX_NAME = "nvindex.usda"
 DISPLAY_NAME = "display.usda"
+USDZ_NAME = "specimen.usdz"
 LAYER_SUFFIXES = (".usda", ".usdc", ".usd")
 CHANGED = "changed since it was written, by an edit or by damage"
 DOUBTFUL = "changed since it was written but kept its size, by damage or by an edit"

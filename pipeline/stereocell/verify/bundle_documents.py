@@ -10,7 +10,7 @@ from stereocell.bundle.write_objects import hash_parts
 from stereocell.model.errors import CheckError
 from stereocell.storage.json_files import read_json
 from stereocell.transfer.shapes2d import find_fault, shapes_from
-from stereocell.usd.write_usdz import USDZ_NAME
+from stereocell.usd.written_files import USDZ_NAME
 from stereocell.verify.build_files import check_usdz
 from stereocell.verify.check_line import raise_on
 

@@ -1,7 +1,8 @@
 """Check a build's files against the rules of their formats, for `stereocell check`.
 
 Each check prints one line, and a failed check doesn't stop the others. Standard validators do most
-of the work: JSON Schema, UsdValidation, the Khronos glTF validator and ktx-parse.
+of the work: JSON Schema, UsdValidation, the Khronos glTF validator and ktx-parse. The checks are
+imported once the kind of the folder is known, because USD is slow to import.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,28 +15,9 @@ from stereocell.model.errors import OutputError, StereoCellError
 from stereocell.steps.tissue_files import FOLDER
 from stereocell.storage.contents import require_kind
 from stereocell.storage.kinds import Kind
-from stereocell.usd.write_usdz import USDZ_NAME
-from stereocell.verify.build_files import (
-    check_stage,
-    check_stage_files,
-    check_stage_hashes,
-    check_tissue,
-    check_units,
-    check_usdz,
-)
+from stereocell.usd.written_files import USDZ_NAME
 from stereocell.verify.build_records import check_plan, check_records, check_report
-from stereocell.verify.bundle_documents import (
-    check_json,
-    check_manifest,
-    check_objects,
-    check_transfer2d,
-    check_usdz_of_bundle,
-    check_volume_lists,
-)
-from stereocell.verify.bundle_hashes import check_hashes, check_tilesets
 from stereocell.verify.check_line import CheckLine
-from stereocell.verify.node_validators import check_meshes, check_textures
-from stereocell.verify.scene_file import check_scene
 
 _Check = tuple[str, Callable[[], str]]
 
@@ -47,6 +29,8 @@ def check(out: Path) -> Iterator[CheckLine]:
     """
     found = require_kind(out, (Kind.BUILD, Kind.BUNDLE, Kind.SITE, Kind.SCENE))
     if found.kind is Kind.SCENE:
+        from stereocell.verify.scene_file import check_scene
+
         yield from check_scene(out, lambda bundle: _checks_of_bundle(bundle, None))
         return
     if found.kind is Kind.BUILD:
@@ -66,6 +50,15 @@ def check(out: Path) -> Iterator[CheckLine]:
 
 
 def _checks_of_build(out: Path) -> list[_Check]:
+    from stereocell.verify.build_files import (
+        check_stage,
+        check_stage_files,
+        check_stage_hashes,
+        check_tissue,
+        check_units,
+        check_usdz,
+    )
+
     out_folder = OutFolder(out)
     has_plan = out_folder.has(out_folder.plan_file)
     return [
@@ -82,6 +75,17 @@ def _checks_of_build(out: Path) -> list[_Check]:
 
 
 def _checks_of_bundle(bundle: Path, out_folder: OutFolder | None) -> list[_Check]:
+    from stereocell.verify.bundle_documents import (
+        check_json,
+        check_manifest,
+        check_objects,
+        check_transfer2d,
+        check_usdz_of_bundle,
+        check_volume_lists,
+    )
+    from stereocell.verify.bundle_hashes import check_hashes, check_tilesets
+    from stereocell.verify.node_validators import check_meshes, check_textures
+
     return [
         ("manifest", lambda: check_manifest(bundle)),
         ("file list", lambda: check_json(bundle / FILES, f"{SCHEMA}#FileIndex", REMEDY)),
