@@ -400,13 +400,13 @@ bench-serve: setup-dev ## Measure the tree of bricks, picture quality by bytes l
 	$(BIN)/python tests/bench/serve_load.py
 
 BENCH_VIEWER := tests/bench/viewer
-bench-viewer: $(DEV_READY) ## Compare the ray march with vtk.js, NiiVue, three's example and a float64 reference
+bench-viewer: $(DEV_READY) ## Compare the ray march with vtk.js, NiiVue, three's example and a float64 reference  (ARGS=--full-mri)
 	@if ! command -v npm >/dev/null; then echo "bench-viewer: skipped: no node and npm"; \
 	elif [ -z "$$CHROMIUM" ]; then echo "bench-viewer: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else \
 	  cd $(BENCH_VIEWER) && { test node_modules/.ready -nt package-lock.json \
 	    || { npm ci --ignore-scripts --no-audit --no-fund --loglevel=error && touch node_modules/.ready; }; } \
-	  && "$$OLDPWD/$(BIN)/python" bench.py "$$OLDPWD/out/bench-viewer"; \
+	  && cd "$$OLDPWD" && $(WITH_ARGS) $(BIN)/python $(BENCH_VIEWER)/bench.py out/bench-viewer ARGS; \
 	fi
 
 bench-fps: setup-dev ## Measure frames per second, mono and stereo, and CPU time on the split screen  (ARGS="--beside /other/viewer_gltf/dist")
