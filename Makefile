@@ -403,21 +403,22 @@ bench-serve: setup-dev ## Measure the tree of bricks, picture quality by bytes l
 	$(BIN)/python tests/bench/serve_load.py
 
 BENCH_VIEWER := tests/bench/viewer
-bench-viewer: $(DEV_READY) ## Compare the ray march with vtk.js, NiiVue, three's example and a float64 reference
+bench-viewer: $(DEV_READY) ## Compare the ray march with vtk.js, NiiVue, three's example and a float64 reference  (ARGS=--full-mri)
 	@if ! command -v npm >/dev/null; then echo "bench-viewer: skipped: no node and npm"; \
 	elif [ -z "$$CHROMIUM" ]; then echo "bench-viewer: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else \
 	  cd $(BENCH_VIEWER) && { test node_modules/.ready -nt package-lock.json \
 	    || { npm ci --ignore-scripts --no-audit --no-fund --loglevel=error && touch node_modules/.ready; }; } \
-	  && "$$OLDPWD/$(BIN)/python" bench.py "$$OLDPWD/out/bench-viewer"; \
+	  && cd "$$OLDPWD" && $(WITH_ARGS) $(BIN)/python $(BENCH_VIEWER)/bench.py out/bench-viewer ARGS; \
 	fi
 
-bench-fps: setup-dev ## Measure the viewer's frames per second in headless Chromium, 64^3 to 512^3, mono and stereo
+bench-fps: setup-dev ## Measure frames per second, mono and stereo, and CPU time on the split screen  (ARGS="--beside /other/viewer_gltf/dist")
 	@mkdir -p out/samples
 	test -e out/samples/head-512.ome.tif || $(BIN)/python tests/bench/fps_volume.py out/samples/head-512.ome.tif 512
 	$(RUN) build out/samples/head-512.ome.tif --out=out/head-512 --workers="$$WORKERS" --preset mri --grid 1x1
 	@if [ -z "$$CHROMIUM" ]; then echo "bench-fps: skipped: no Chromium: make browser, or set CHROMIUM"; \
-	else out="$$PWD/out" && cd $(VIEWER) && npm run --silent bench-fps -- "$$out/bench-fps" "$$out/head-512/bundle"; fi
+	else out="$$PWD/out" && cd $(VIEWER) && "../$(BIN)/python" ../pipeline/with_args.py \
+	  npm run --silent bench-fps -- "$$out/bench-fps" "$$out/head-512/bundle" ARGS; fi
 
 wheel: setup out/wheel/constraints.txt ## Make a wheel and a source distribution that contain the built viewer: out/wheel
 	$(BIN)/hatchling build -t wheel -t sdist -d out/wheel

@@ -1,11 +1,16 @@
 /**
- * Measures frames per second of a bundle in headless Chromium, by the viewer's own benchmark (`?bench`).
+ * Measures a bundle in headless Chromium: frames per second by the viewer's own benchmark (`?bench`), and the CPU time
+ * of a frame of the split screen (split_frames.ts).
  *
  *   npm run build && npm run bench-fps -- OUT BUNDLE [BUNDLE ...]
- *     --size 640x400   CSS pixels
- *     --flight 4       length of each run, s
+ *     --size 640x400   CSS pixels of the flights
+ *     --flight 4       length of each run, s; 0 leaves the flights out
+ *     --beside DIST    also measures the split screen of another checkout's built viewer, alternately
  *
- * Writes OUT/<bundle's name>.json and .png.
+ * To compare with an older commit, make a worktree of it, run `npm ci && npm run build` in its viewer_gltf, and give
+ * the folder viewer_gltf/dist there as DIST.
+ *
+ * Writes OUT/<bundle's name>.json and .png of the flights.
  */
 import { mkdir, writeFile } from "node:fs/promises";
 import { basename, dirname, join, resolve } from "node:path";
@@ -13,12 +18,14 @@ import { parseArgs } from "node:util";
 import type { Report } from "../src/bench/report";
 import { enter, startChromium } from "../test/support/browser/chromium";
 import { Host } from "../test/support/browser/host";
+import { measureSplitFrames } from "./split_frames";
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
   options: {
     size: { type: "string", default: "640x400" },
     flight: { type: "string", default: "4" },
+    beside: { type: "string" },
   },
 });
 const [out, ...bundles] = positionals;
@@ -31,7 +38,10 @@ const dist = new URL("../dist/", import.meta.url).pathname;
 await mkdir(out, { recursive: true });
 const chromium = await startChromium();
 try {
-  for (const bundle of bundles) await measure(resolve(bundle), nameOf(resolve(bundle)));
+  for (const bundle of bundles.map((each) => resolve(each))) {
+    if (Number(values.flight) > 0) await measure(bundle, nameOf(bundle));
+    await printSplitFrames(bundle, nameOf(bundle));
+  }
 } finally {
   await chromium.close();
 }
@@ -68,4 +78,23 @@ async function measure(bundle: string, name: string): Promise<void> {
     await browser.close();
     await host.stop();
   }
+}
+
+async function printSplitFrames(bundle: string, name: string): Promise<void> {
+  const viewers = [dist, ...(values.beside === undefined ? [] : [resolve(values.beside)])];
+  for await (const frames of measureSplitFrames(chromium, bundle, viewers)) {
+    for (const { mode, viewer, cpu_ms } of frames) {
+      const ratio = median(cpu_ms.map((each, i) => frames[0].cpu_ms[i] / each));
+      const [low, high] = [Math.min(...cpu_ms), Math.max(...cpu_ms)].map(Math.round);
+      process.stdout.write(
+        `${name}: ${mode}, split screen of 1600 x 720: ${Math.round(median(cpu_ms))} ms of CPU a frame (${low} to ${high})` +
+          `${viewer === dist ? "" : ` by ${viewer}; this checkout takes ${ratio.toFixed(2)} of it`}\n`,
+      );
+    }
+  }
+}
+
+/** Returns the middle value, or the upper one of the two in the middle. */
+function median(values: readonly number[]): number {
+  return [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
 }

@@ -132,25 +132,29 @@ def brain_cells() -> Scene:
     return scene_of("brain_cells", voxels, np.array([x, y, z]), ISO, "default")
 
 
-def head() -> tuple[Scene, ...]:
-    """Return the real MRI of STEREOCELL_DATA, averaged over 2 x 2 x 2 voxels, or None without it.
+def head(*, is_full: bool = False) -> tuple[Scene, ...]:
+    """Return the real MRI of STEREOCELL_DATA, as two scenes; none without the data.
 
-    Its voxels (.667, .667, .7 mm) are treated as cubes, which NiiVue needs.
+    It is averaged over 2 x 2 x 2 voxels unless `is_full`. Its voxels (.667, .667, .7 mm) are
+    treated as cubes, which NiiVue needs.
     """
     folder = Path(os.environ.get("STEREOCELL_DATA", "")) / "mri_t1_7t" / "dicoms"
     if not folder.is_dir():
         return ()
     source = read.open(str(folder))
-    box = source.levels[0].box
-    values = source.read(0, box, 0).voxels.astype(np.float32)
-    even = values[tuple(slice(0, n // 2 * 2) for n in values.shape)]
-    z, y, x = (n // 2 for n in even.shape)
-    halved = even.reshape(z, 2, y, 2, x, 2).mean(axis=(1, 3, 5))
-    voxels = windowed(halved.astype(np.float64))
-    spacing = np.full(3, 2 * min(source.levels[0].spacing_um))
+    values = source.read(0, source.levels[0].box, 0).voxels.astype(np.float32)
+    spacing = np.full(3, min(source.levels[0].spacing_um))
+    name = "mri_full"
+    if not is_full:
+        even = values[tuple(slice(0, n // 2 * 2) for n in values.shape)]
+        z, y, x = (n // 2 for n in even.shape)
+        values = even.reshape(z, 2, y, 2, x, 2).mean(axis=(1, 3, 5))
+        spacing *= 2
+        name = "mri"
+    voxels = windowed(values.astype(np.float64))
     return (
-        scene_of("mri_soft", voxels, spacing, HEAD_ISO, "soft"),
-        scene_of("mri_default", voxels, spacing, HEAD_ISO, "default"),
+        scene_of(f"{name}_soft", voxels, spacing, HEAD_ISO, "soft"),
+        scene_of(f"{name}_default", voxels, spacing, HEAD_ISO, "default"),
     )
 
 

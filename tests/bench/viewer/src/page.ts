@@ -3,8 +3,8 @@ import { fetchScene, type Renderer } from "./scene";
 
 export type Bench = Readonly<{
   setup(scene: string, camera: string, setting: number): Promise<void>;
-  /** Milliseconds of one picture. */
-  time(): number;
+  /** Mean milliseconds of a picture, over `frames` of them. */
+  time(frames: number): number;
   /** RGBA, bottom row first, base64. */
   picture(): string;
   countSteps(): number | null;
@@ -48,10 +48,10 @@ export function serve(make: () => Renderer): void {
       }
       read();
     },
-    time() {
+    time(frames) {
       const start = performance.now();
-      read();
-      return performance.now() - start;
+      for (let i = 0; i < frames; i++) read();
+      return (performance.now() - start) / frames;
     },
     picture() {
       read();
