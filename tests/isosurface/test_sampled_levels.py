@@ -19,7 +19,7 @@ from stereocell.samples.cycif import SPACING_UM, write_cycif
 
 MADE = ("two classes", "shells", "tissue", "eight bit", "balls, 15%, x 1, 40 photons, uneven")
 REAL = ("nuclei", "CT bone", "MRI head", "mouse brain")
-SAMPLE = {"grid": (1, 1), "tile_size": (97, 320, 320), "seed": 0, "brightness_spread": 1.0}
+SAMPLE = {"grid": (1, 1), "tile_size": (194, 320, 320), "seed": 0, "brightness_spread": 1.0}
 CHANNELS = ("Hoechst", "MART1", "CD31")
 # Volumes whose level follows the sample, and why
 FAILING = {

@@ -81,7 +81,7 @@ TENTH = 0.1  # share of the contrast by which a level is moved to measure its st
 # by at most the share ALIKE of the contrast. Then the best of _TRIED levels is taken, between the
 # multiples NEAR of the level's height.
 BRIGHTEST, ALIKE, NEAR = 0.95, 0.4, (0.75, 1.5)
-_TRIED, _BLUR = 128, 16  # number of levels, and the sigma in levels that smooths their scores
+_TRIED, _BLUR = 128, 8  # number of levels, and the sigma in levels that smooths their scores
 TILE_FACTOR = 2.0  # largest ratio between the heights of a tile's own level and the channel's
 MIN_NOISE = 1e-3  # share of the values' range: noise that is assumed for data without noise
 
