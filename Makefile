@@ -79,7 +79,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup setup-dev demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-build bench-builds bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
+.PHONY: help setup setup-dev demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-build bench-builds bench-demo bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table benchmarks clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -347,6 +347,9 @@ bench-build: setup-dev ## Measure each phase of a build of INPUT into OUT, with 
 
 bench-builds: setup-dev ## Measure each phase of a sample tile and of real volumes, on 1 and 2 workers  (ARGS="--baseline CHECKOUT --publish")
 	$(WITH_ARGS) $(BIN)/python tests/bench/builds.py out/bench-builds ARGS
+
+bench-demo: setup-dev ## Time `make demo` in a fresh clone of the last commit, step by step
+	$(BIN)/python tests/bench/demo.py out/bench-demo
 
 bench-live: setup-dev ## Time `stereocell view SOURCE`: first picture, its colours, and answers while a build runs
 	$(BIN)/python tests/bench/live_view.py
