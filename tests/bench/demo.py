@@ -27,8 +27,18 @@ RESULTS = {
     "bundle": "out/demo/bundle/manifest.json",
     "report": "out/demo/report/index.html",
 }
-# Settings of this checkout that would change what a clone does
-OWN = ("PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "STEREOCELL_DATA", "MAKEFLAGS", "MAKELEVEL", "OUT")
+# A clone must not inherit these settings of this checkout.
+OWN = (
+    "PYTHONPATH",
+    "PYTHONDONTWRITEBYTECODE",
+    "STEREOCELL_DATA",
+    "MAKEFLAGS",
+    "MAKELEVEL",
+    "OUT",
+    "SAMPLE",
+    "WORKERS",
+    "ARGS",
+)
 
 
 def run(clone: Path) -> Spent:

@@ -13,6 +13,7 @@ from support.missing_inputs import MISSING_INPUTS
 LARGE = {
     "distributed",
     "h5py",
+    "igl",
     "imagecodecs",
     "matplotlib",
     "nibabel",
@@ -105,4 +106,6 @@ def _roots_after(code: str) -> set[str]:
     done = subprocess.run(
         [sys.executable, "-c", code + TELL], capture_output=True, text=True, check=True
     )
-    return {name.partition(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
+    roots = {name.partition(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
+    assert "stereocell" in roots
+    return roots

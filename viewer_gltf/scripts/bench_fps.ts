@@ -1,6 +1,6 @@
 /**
- * Measures a bundle in headless Chromium: frames per second by the viewer's own benchmark (`?bench`), and the CPU time
- * of a frame of the split screen (split_frames.ts).
+ * This script measures a bundle in headless Chromium. The viewer's own benchmark (`?bench`) counts frames per second,
+ * and split_frames.ts finds the CPU time of a split-screen frame.
  *
  *   npm run build && npm run bench-fps -- OUT BUNDLE [BUNDLE ...]
  *     --size 640x400   CSS pixels of the flights

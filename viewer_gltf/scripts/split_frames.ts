@@ -97,7 +97,7 @@ async function openSplit(page: Page, address: string): Promise<void> {
   const viewer = new ViewerPage(page);
   await viewer.open(address);
   await viewer.settled();
-  await page.keyboard.press("j"); // choosing by gaze off: otherwise the resting gaze would select a tile
+  await page.keyboard.press("j"); // This turns choosing by gaze off, since a resting gaze would select a tile.
   await page.keyboard.press("P");
   await page.waitForFunction(() => window.stereocell?.snapshot().isStereo === true);
   await viewer.settled();

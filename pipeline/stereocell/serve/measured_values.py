@@ -78,7 +78,7 @@ class MeasuredValues:
         listed = read_list(self._stage / _LIST, "").get(path)
         if listed != named or find_faults(self._stage, {path: named}, since=self._stage / _LIST):
             return None
-        # slow to import, and few pages ask for values
+        # These modules are slow to import, and few pages ask for values.
         from stereocell.formats.vdb import MEASURED_NAME
         from stereocell.formats.vdb_read import VdbValues
 

@@ -109,7 +109,9 @@ def container_bytes(root: Path = Path("/")) -> float:
 
     root  root of the file system
 
-    `distributed.system.memory_limit` returns the same, but its import takes half a second.
+    `distributed.system.memory_limit` finds the same, but its import takes half a second. It also
+    counts limits that bound nothing: `memory.low` and the soft limit of version 1, which protect
+    memory of the group, and RLIMIT_RSS, which Linux ignores.
     """
     found = []
     for name in ("memory.max", "memory.high", "memory/memory.limit_in_bytes"):  # last: version 1
