@@ -5,7 +5,8 @@
 With a baseline, another checkout of this repository, each build is made by its code first and by
 this one directly afterwards, with the same packages. Then each row also has the baseline's figures,
 and how many times as fast this checkout is. All of it without a baseline takes ten minutes. Real
-volumes are those of STEREOCELL_DATA; one that is missing is skipped. The builds stay in FOLDER.
+volumes are those of STEREOCELL_DATA; one that is missing is skipped. The builds stay in FOLDER. The
+bench fails if another number of workers gives other bytes.
 """
 
 import argparse
@@ -23,6 +24,8 @@ from machine import range_of, stated
 from phases import COLUMNS, Cost, environment_of, rows_of, run_phases, totals
 from published import publish
 
+from support.digests import digests_of_build
+
 DATA = Path(os.environ.get("STEREOCELL_DATA", "../shared/data")).resolve()
 TILE = (194, 512, 512)
 # Names, files below DATA, and the flags of their plans
@@ -37,11 +40,15 @@ TITLES = {1: "By one worker", 2: "By two workers"}  # of the published tables
 
 @dataclass(frozen=True)
 class Built:
-    """Costs of the phases of one input; `before` has those of the baseline, if there is one."""
+    """Costs of the phases of one input; `before` has those of the baseline, if there is one.
+
+    digests  hashes of the files that this checkout wrote
+    """
 
     name: str
     costs: dict[str, Cost]
     before: dict[str, Cost]
+    digests: dict[str, str]
 
 
 def inputs(folder: Path, tile: tuple[int, int, int], only: str) -> Iterator[tuple[str, list[str]]]:
@@ -68,7 +75,7 @@ def measure(folder: Path, name: str, plan: list[str], workers: int, baseline: Pa
         out = folder / ("before" if checkout else "now")
         shutil.rmtree(out, ignore_errors=True)
         found.append(run_phases(out, plan, ["--workers", str(workers)], (), checkout))
-    return Built(name, found[-1], found[0] if baseline else {})
+    return Built(name, found[-1], found[0] if baseline else {}, digests_of_build(out))
 
 
 def compared_rows(built: Built) -> list[list[str]]:
@@ -91,7 +98,7 @@ def compile_kernels(checkout: Path | None) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment_of(checkout))
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="the folder of the sample tile and of the builds")
     parser.add_argument("--only", default="", help="inputs whose name begins so")
@@ -123,8 +130,17 @@ def main() -> None:
                 cost for built in done for cost in (*built.costs.values(), *built.before.values())
             ]
             publish("builds", TITLES[workers], columns, rows, range_of(costs))
+    differing = {
+        one.name
+        for done in builds.values()
+        for one, first in zip(done, next(iter(builds.values())), strict=True)
+        if one.digests != first.digests
+    }
+    for name in sorted(differing):
+        print(f"{name}: the numbers of workers gave different bytes")
+    return 1 if differing else 0
 
 
 if __name__ == "__main__":
     with stated():
-        main()
+        sys.exit(main())

@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -100,19 +101,22 @@ def _look(
     cost: Cost,
     spent: dict[int, float],
 ) -> None:
-    """Record the memory of all processes, and the CPU seconds of the command's own processes."""
-    try:
-        for process, role in [
-            (parent, "command"),
-            *((worker, "worker") for worker in (*workers_of(parent), *others)),
-        ]:
-            is_own = process not in others
-            peak = peak_of(process.pid) if is_own else process.memory_info().rss
-            cost.peaks[role] = max(cost.peaks[role], peak)
-            if is_own:
+    """Record the memory of the command and of workers, and the CPU seconds of all its processes.
+
+    Workers are forked from a server, whose imports also take CPU time.
+    """
+    own, workers = [parent], list[psutil.Process]()
+    with suppress(psutil.Error):
+        own += parent.children(recursive=True)
+        workers = workers_of(parent)
+    for process in (*own, *others):
+        with suppress(psutil.Error, OSError):  # the process ended meanwhile
+            if process in own:
                 spent[process.pid] = _cpu_of(process)
-    except (psutil.Error, OSError):
-        pass  # the process ended meanwhile
+            if process is parent or process in (*workers, *others):
+                peak = peak_of(process.pid) if process in own else process.memory_info().rss
+                role = "command" if process is parent else "worker"
+                cost.peaks[role] = max(cost.peaks[role], peak)
 
 
 def peak_of(pid: int) -> int:

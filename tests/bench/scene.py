@@ -31,12 +31,11 @@ from stereocell.formats.vdb import MEASURED_NAME
 from stereocell.formats.vdb_read import read_vdb_head
 from stereocell.storage.json_files import read_json
 from support.clusters import running_cluster
-from support.digests import digests_of
+from support.digests import digests_of_build
 
 GRID, TILE = (5, 2), (194, 512, 512)
 WAYS = ("1", "2", "cluster")
 CLUSTER_WORKERS = 2
-COMPARED = ("units", "stage", "bundle")
 
 
 def build(source: Path, out: Path, grid: tuple[int, int], way: str) -> dict[str, Cost]:
@@ -104,12 +103,7 @@ def main(
         if is_published and way == "2":
             around = f"by two workers, {range_of([*costs.values()])}"
             publish("scene", "Phases of the build", COLUMNS, rows_of(costs), around)
-        digests[way] = {
-            f"{part}/{path}": digest
-            for part in COMPARED
-            for path, digest in digests_of(out / part).items()
-            if not path.endswith("seconds.json")
-        }
+        digests[way] = digests_of_build(out)
     print_sizes(out)
     first, *others = digests.values()
     are_same = all(first == other for other in others)

@@ -12,6 +12,7 @@ from machine import stated, timed, typical
 from support.missing_inputs import MISSING_INPUTS
 
 ROUNDS = 7
+MISSING = ", input missing"  # ends the names of commands that exit with 1
 PROGRAMS = {
     "python": ["-c", ""],
     "import stereocell": ["-c", "import stereocell"],
@@ -22,7 +23,7 @@ PROGRAMS = {
     "doctor": ["-m", "stereocell.cli", "doctor"],
     "settings": ["-m", "stereocell.cli", "settings"],
     **{
-        f"{name}, input missing": ["-m", "stereocell.cli", *words]
+        f"{name}{MISSING}": ["-m", "stereocell.cli", *words]
         for name, words in MISSING_INPUTS.items()
     },
 }
@@ -33,7 +34,9 @@ def main() -> None:
         rounds = []
         for _ in range(ROUNDS):
             with timed() as spent:
-                subprocess.run([sys.executable, *words], capture_output=True, check=False)
+                ended = subprocess.run([sys.executable, *words], capture_output=True, text=True)
+            if ended.returncode != name.endswith(MISSING):
+                raise SystemExit(f"{name}: exit {ended.returncode}: {ended.stderr[-2000:]}")
             rounds.append(spent)
         least = min(spent.seconds for spent in rounds)
         print(f"{name:36} least {least:.2f} s, medians {typical(*rounds)}")

@@ -1,6 +1,8 @@
 """A level does not depend on how many voxels are counted, nor on where the grid begins."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,7 +21,8 @@ from stereocell.samples.cycif import SPACING_UM, write_cycif
 
 MADE = ("two classes", "shells", "tissue", "eight bit", "balls, 15%, x 1, 40 photons, uneven")
 REAL = ("nuclei", "CT bone", "MRI head", "mouse brain")
-SAMPLE = {"grid": (1, 1), "tile_size": (194, 320, 320), "seed": 0, "brightness_spread": 1.0}
+SAMPLE = {"grid": (1, 1), "seed": 0, "brightness_spread": 1.0}
+PLANES = (194, 97)
 CHANNELS = ("Hoechst", "MART1", "CD31")
 # Volumes whose level follows the sample, and why
 FAILING = {
@@ -35,6 +38,13 @@ HALVED = [
         for name, reason in FAILING.items()
     ),
 ]
+THIN = "even and odd planes of the few vessels differ by 1.5 % to either side"
+STAINS_HALVED = [
+    *((channel, 194) for channel in CHANNELS),
+    ("Hoechst", 97),
+    ("MART1", 97),
+    pytest.param("CD31", 97, marks=pytest.mark.xfail(strict=True, reason=THIN)),
+]
 SAME = 0.01  # share of a level's contrast by which it may differ
 SAMPLES = {
     "even rows": (slice(None), slice(0, None, 2)),
@@ -45,11 +55,20 @@ SAMPLES = {
 
 
 @pytest.fixture(scope="module")
-def cycif(tmp_path_factory: pytest.TempPathFactory) -> NDArray[np.uint16]:
-    """The voxels of a tile of the sample `cycif`, (c, z, y, x)."""
-    path = tmp_path_factory.mktemp("sample") / "block.ome.zarr"
-    write_cycif(path, **SAMPLE)
-    return np.asarray(zarr.open_array(path / "0", mode="r")[:])
+def cycif(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Case]:
+    """Returns the case of a stain of the sample `cycif`, in a tile of a number of planes."""
+
+    @cache
+    def voxels(planes: int) -> NDArray[np.uint16]:
+        path = tmp_path_factory.mktemp("sample") / "block.ome.zarr"
+        write_cycif(path, tile_size=(planes, 320, 320), **SAMPLE)
+        return np.asarray(zarr.open_array(path / "0", mode="r")[:])
+
+    def case(channel: str, planes: int) -> Case:
+        of_channel = voxels(planes)[CHANNELS.index(channel)]
+        return Case(channel, "looked at", SPACING_UM, lambda: (of_channel, None))
+
+    return case
 
 
 def _case(name: str) -> Case:
@@ -99,12 +118,11 @@ def test_the_level_is_the_same_on_half_of_the_voxels(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("channel", CHANNELS)
+@pytest.mark.parametrize(("channel", "planes"), STAINS_HALVED)
 def test_the_level_of_a_stain_is_the_same_on_half_of_the_voxels(
-    cycif: NDArray[np.uint16], channel: str
+    cycif: Callable[[str, int], Case], channel: str, planes: int
 ) -> None:
-    voxels = cycif[CHANNELS.index(channel)]
-    _compare_halves(Case(channel, "looked at", SPACING_UM, lambda: (voxels, None)))
+    _compare_halves(cycif(channel, planes))
 
 
 def _compare_halves(case: Case) -> None:
@@ -118,7 +136,19 @@ def _compare_halves(case: Case) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*MADE, *REAL, *FAILING])
 def test_the_level_is_the_same_on_a_mirrored_and_on_a_shifted_grid(name: str) -> None:
-    case = _case(name)
+    _compare_grids(_case(name))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("planes", PLANES)
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_the_level_of_a_stain_is_the_same_on_a_mirrored_and_on_a_shifted_grid(
+    cycif: Callable[[str, int], Case], channel: str, planes: int
+) -> None:
+    _compare_grids(cycif(channel, planes))
+
+
+def _compare_grids(case: Case) -> None:
     voxels, _ = case.load()
 
     def level_of(changed: NDArray[np.generic]) -> Level:

@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 from stereocell.engine.step_record import all_libraries
 from stereocell.model.errors import StereoCellError
 from stereocell.model.extra_packages import MAKERS, version_of
-from stereocell.storage.processes import keep_freed_memory
+from stereocell.storage.processes import keep_freed_memory, release_freed_memory
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -153,7 +153,10 @@ class _Able(Generic[T, R]):
         here = _describe_worker(str(self.shared or ""))
         _require_alike("a worker on", here, self.ours, self.shared)
         keep_freed_memory()
-        return self.function(task)
+        try:
+            return self.function(task)
+        finally:
+            release_freed_memory()
 
 
 def _require_alike(

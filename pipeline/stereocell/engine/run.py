@@ -31,7 +31,7 @@ from stereocell.engine.worker_pool import Outcome, WorkerPool
 from stereocell.kernels.cache_place import are_compiled, compile_in_process
 from stereocell.model.duration import in_words
 from stereocell.model.errors import StereoCellError
-from stereocell.storage.processes import shortage
+from stereocell.storage.processes import release_freed_memory, shortage
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -141,6 +141,7 @@ class Engine:
                     yield place, None, error
                 else:
                     yield place, result, None
+                release_freed_memory()
             return
         work, settle = carried(function)
         for place, answer, failure in self._outcomes_of_workers(function, work, tasks, needs):

@@ -8,7 +8,6 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from stereocell.engine.run import Engine
 from stereocell.engine.step import Document, Step, Work
-from stereocell.storage.processes import release_freed_memory
 from stereocell.storage.workspace import cached
 
 R = TypeVar("R")
@@ -114,12 +113,9 @@ def keep(task: Task) -> None:
     """Compute one result and write it. Runs on a worker."""
     with cached(*task.inputs):
         task.step.keep(task.place)
-    release_freed_memory()
 
 
 def with_inputs(function: Callable[[S], R], task: S) -> R:
     """Return a function's result for a task. Runs on a worker."""
     with cached(*task.inputs):
-        result = function(task)
-    release_freed_memory()
-    return result
+        return function(task)

@@ -12,7 +12,7 @@ from multiprocessing import connection, parent_process
 from multiprocessing.connection import Connection
 from typing import Any
 
-from stereocell.storage.processes import keep_freed_memory
+from stereocell.storage.processes import keep_freed_memory, release_freed_memory
 
 READY = "ready"  # first answer of a worker, once it has started
 
@@ -29,6 +29,7 @@ def serve(pipe: "Connection[Any, Any]") -> None:
         pipe.send(READY)
         while True:
             pipe.send_bytes(_answer(pipe.recv_bytes()))
+            release_freed_memory()
     except (EOFError, OSError):  # the command has closed its end, or has ended
         return
 

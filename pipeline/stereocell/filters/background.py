@@ -13,7 +13,8 @@ a field that was constant beyond the outermost centres (docs/decisions/levels.md
 
 In large volumes a quarter of the voxels is looked at: those whose three indices are all even or all
 odd. They treat all axes alike. Even and odd lines count equally often, because a scanner may record
-them differently.
+them differently. For the same reason, half of the voxels are looked at in an image of a single
+plane.
 """
 
 from collections.abc import Sequence
@@ -71,8 +72,9 @@ def find_background(
     ]
     z, y, x = (tuple((a + b - 1) / 2 for a, b in pairwise(edge.tolist())) for edge in edges)
     is_sampled = field.size >= max(SMALL, LARGE * prod(blocks))
-    starts, every = ((0, 1), 2) if is_sampled else ((0,), 1)
-    samples = [_Sample.of(field, padding, start, every) for start in starts]
+    every = tuple(2 if is_sampled and n > 1 else 1 for n in field.shape)
+    starts = {tuple(min(start, k - 1) for k in every) for start in (0, 1)}
+    samples = [_Sample.of(field, padding, start, every) for start in sorted(starts)]
     inner = np.zeros(blocks)
     for _ in range(passes):
         knots = np.full(blocks, np.nan)
@@ -98,31 +100,36 @@ def find_background(
 
 @dataclass(frozen=True, slots=True)
 class _Sample:
-    """Every k-th voxel along each axis, from which the background found so far was subtracted.
+    """Voxels at regular distances, from which the background found so far was subtracted.
 
     values  float32 (z, y, x), voxel values
     kept    bool, the same shape: voxels that are not padding; None: there is no padding
-    start   index of the first voxel along each axis
-    every   k
+    start   (z, y, x), index of the first voxel
+    every   (z, y, x), step from one voxel to the next
     """
 
     values: NDArray[np.float32]
     kept: NDArray[np.bool_] | None
-    start: int
-    every: int
+    start: tuple[int, ...]
+    every: tuple[int, ...]
 
     @classmethod
     def of(
-        cls, field: NDArray[Any], padding: NDArray[np.bool_] | None, start: int, every: int
+        cls,
+        field: NDArray[Any],
+        padding: NDArray[np.bool_] | None,
+        start: tuple[int, ...],
+        every: tuple[int, ...],
     ) -> "_Sample":
-        taken = (slice(start, None, every),) * 3
+        taken = tuple(slice(first, None, k) for first, k in zip(start, every, strict=True))
         kept = None if padding is None else ~padding[taken]
         return cls(field[taken].astype(np.float32), kept, start, every)
 
     def within(self, block: Sequence[tuple[int, int]]) -> NDArray[np.float32]:
         """Return the values within a block (first and end of each axis), float32 (n,)."""
         z, y, x = (
-            slice(*(max(0, -((self.start - end) // self.every)) for end in ends)) for ends in block
+            slice(*(max(0, -((first - end) // k)) for end in ends))
+            for ends, first, k in zip(block, self.start, self.every, strict=True)
         )
         values = self.values[z, y, x]
         return values.ravel() if self.kept is None else values[self.kept[z, y, x]]
@@ -130,12 +137,11 @@ class _Sample:
     def subtract(self, rise: LatticeField) -> None:
         """Subtract a field whose centres count voxels, in place."""
         z, y, x = (
-            tuple((place - self.start) / self.every for place in axis) for axis in rise.centres
+            tuple((place - first) / k for place in axis)
+            for axis, first, k in zip(rise.centres, self.start, self.every, strict=True)
         )
         own = LatticeField((z, y, x), rise.values)
         depth, height, width = self.values.shape
-        if not height * width:  # the volume has only one row or column
-            return
         for k in range(0, depth, _PLANES):  # a field of the whole sample would double its memory
             part = self.values[k : k + _PLANES]
             part -= own.at(Box((k, 0, 0), (k + len(part), height, width)))

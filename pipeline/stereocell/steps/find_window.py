@@ -93,7 +93,7 @@ class FindWindow(Step[Window]):
     window         display window in voxel values, if the settings state it; None: it is found
     """
 
-    VERSION: ClassVar[int] = 3
+    VERSION: ClassVar[int] = 4
     FORM: ClassVar[Document[Window]] = WINDOW
 
     voxels: Voxels
