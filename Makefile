@@ -105,7 +105,7 @@ $(DEV_READY): requirements-dev.lock $(READY)
 	$(call INSTALL,--require-hashes -r requirements.lock -r requirements-dev.lock)
 	@touch $@
 
-# Compiles the loops over voxels and triangles in half a minute on two cores, so that no build waits.
+# Compiles the loops over voxels and triangles, within a minute on two cores, so that no build waits.
 $(KERNELS_READY): $(READY)
 	@$(BIN)/python -m stereocell.kernels
 	@touch $@

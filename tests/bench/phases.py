@@ -28,6 +28,7 @@ from machine import Spent, load, measure_reference, stated
 from support.worker_processes import workers_of
 
 PHASES = ("units", "stage", "bundle", "report", "check")  # after the plan
+AT_ONCE = "`build`, one command"  # name of the row
 OFTEN_S = 0.2  # seconds between two looks at the processes
 MB = 1e6
 COLUMNS = ("phase", "seconds", "CPU", "references", "peak of the command, of a worker, MB")
@@ -163,10 +164,17 @@ def run_phases(
     return costs
 
 
+def build_at_once(out: Path, plan: list[str], how: list[str], checkout: Path | None) -> Cost:
+    """Build by a single command, which starts once. Print its cost, and return it."""
+    cost = watch(["build", *plan, "-o", str(out), *how], (), checkout)
+    print(f"  {AT_ONCE:7}{cost}   peak, MB: {in_mb(cost.peaks)}", flush=True)
+    return cost
+
+
 def totals(costs: dict[str, Cost]) -> dict[str, Cost]:
     """Return the cost of the build, and of the build with its check."""
-    build = [cost for phase, cost in costs.items() if phase != "check"]
-    return {"the build": sum_of(build), "with the check": sum_of(costs.values())}
+    apart = [costs[phase] for phase in ("plan", *PHASES)]
+    return {"the build": sum_of(apart[:-1]), "with the check": sum_of(apart)}
 
 
 def rows_of(costs: dict[str, Cost]) -> list[list[str]]:

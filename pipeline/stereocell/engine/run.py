@@ -163,7 +163,7 @@ class Engine:
             self.join()
             return run_on_cluster(self._client, able(work, self._shared), tasks)
         if self._pool is None:
-            if not are_compiled():  # otherwise each worker would spend half a minute on it
+            if not are_compiled():  # otherwise each worker would spend a minute on it
                 console.print("compiling loops, once on this machine", markup=False)
                 compile_in_process()
             plain = function.func if isinstance(function, partial) else function
