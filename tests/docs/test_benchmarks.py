@@ -32,7 +32,7 @@ class Copy:
     scale: float = 1.0
 
 
-TILE = r"(?s)By two workers.*sample tile of 194 x 512 x 512.*?the build \| "
+TILE = r"(?s)By two workers.*sample tile of 194 x 512 x 512.*?one command \| "
 COPIES = [
     Copy(page, *others)  # type: ignore[arg-type]
     for page, copies in {
@@ -56,6 +56,7 @@ COPIES = [
             (r"64\^3 voxels \| (\S+) minutes", "breadth", r"968 units take (\S+) minutes"),
         ],
         "decisions/unit-of-work-scene.md": [
+            (r"sample tile .* \| 119\.8, now (\S+)", "builds", TILE + r"(\S+)"),
             (r"it takes (\S+) minutes", "scene", r"the build \| (\S+)", 1 / 60),
             (r"the deep check (\S+)\.", "scene", r"check \| (\S+)", 1 / 60),
         ],
