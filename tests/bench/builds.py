@@ -82,7 +82,8 @@ def measure(folder: Path, name: str, plan: list[str], workers: int, baseline: Pa
     for checkout in ([baseline] if baseline else []) + [None]:
         print(f"{name}, {workers} workers, {checkout or 'this checkout'}", flush=True)
         out = folder / ("before" if checkout else "now")
-        shutil.rmtree(out, ignore_errors=True)
+        for left in (out, folder / "at-once"):  # a build that was stopped would go on there
+            shutil.rmtree(left, ignore_errors=True)
         how = ["--workers", str(workers)]
         costs = run_phases(out, plan, how, (), checkout)
         costs[AT_ONCE] = build_at_once(folder / "at-once", plan, how, checkout)

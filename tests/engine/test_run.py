@@ -1,6 +1,7 @@
 """The engine runs all tasks and returns results in their order, even if some fail."""
 
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ from stereocell.engine import run
 from stereocell.engine.cluster_tasks import _outcome_of
 from stereocell.engine.run import Engine, TasksFailedError
 from support.server.timeouts import PATIENCE_S
-from support.worker_tasks import double, read_variable
+from support.worker_tasks import double, free_much, read_variable
 
 
 @pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
@@ -29,6 +30,17 @@ def test_results_come_in_the_tasks_order_and_failures_at_the_end(workers: int) -
         "t4: ValueError: four is a bug",
         "bad: 3 of 5 failed",
     ]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc has malloc_trim")
+def test_a_worker_returns_the_memory_of_a_task_before_the_next_one() -> None:
+    engine = Engine(1)
+    try:
+        first, *later = engine.run("free", free_much, [(f"t{n}", n) for n in range(3)])
+    finally:
+        engine.close()
+    assert max(later) - first < 200e6
 
 
 @pytest.mark.slow

@@ -4,7 +4,12 @@ import os
 import time
 from pathlib import Path
 
+import numpy as np
+import psutil
+
 from stereocell.model.errors import SourceError
+
+kept: list[np.ndarray] = []  # arrays that stay in a worker after its task
 
 
 def double(value: int) -> int:
@@ -62,3 +67,12 @@ def write_for_ever(file: Path) -> None:
         with replacing(file) as half:
             half.write_bytes(b"half")
             wait_for_ever(file.with_name(f"{file.name}.begun"))
+
+
+def free_much(_: int) -> int:
+    """Fill and free 640 MB. Return the bytes of memory that this process held before."""
+    before = psutil.Process().memory_info().rss
+    arrays = [np.ones(8_000_000) for _ in range(10)]
+    kept.append(np.ones(1000))  # lies above the freed arrays, at the end of the heap
+    del arrays
+    return int(before)
