@@ -13,8 +13,8 @@ a field that was constant beyond the outermost centres (docs/decisions/levels.md
 
 In large volumes a quarter of the voxels is looked at: those whose three indices are all even or all
 odd. They treat all axes alike. Even and odd lines count equally often, because a scanner may record
-them differently. For the same reason, half of the voxels are looked at in an image of a single
-plane.
+them differently. For the same reason, half of the voxels are looked at in a coarse level that
+has a single plane.
 """
 
 from collections.abc import Sequence
