@@ -270,6 +270,17 @@ def find_spread(at: Points, triangles: Ints) -> NDArray[np.bool_]:
     return spread
 
 
+@part
+def _share_spread(triangles: Ints, i: int, j: int, spread: NDArray[np.bool_]) -> bool:
+    """Return whether two triangles have a common corner that is in `spread`."""
+    a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
+    shared = False
+    for k in range(3):
+        v = triangles[j, k]
+        shared |= ((v == a) | (v == b) | (v == c)) & spread[v]
+    return shared
+
+
 @kernel
 def find_candidates(
     at: Points,
@@ -297,45 +308,40 @@ def find_candidates(
     most = 1
     for c in range(len(first) - 1):
         most = max(most, first[c + 1] - first[c])
-    # For the triangles of one cell, side by side in memory: their boxes and corners, and the axes
-    # along which their boxes start in the cell
-    boxes, corners = np.empty((most, 6)), np.empty((most, 3), np.int32)
-    # Vertex of each corner; -1 if it is not in `spread`, so that triangles may intersect around it
-    round_corners = np.empty((most, 3), np.int32)
-    starts, due = np.empty(most, np.int8), np.empty(most, np.bool_)
+    # The boxes of one cell's triangles, a coordinate after another, so that the processor compares
+    # one box with several others at a time
+    x0, y0, z0 = np.empty(most), np.empty(most), np.empty(most)
+    x1, y1, z1 = np.empty(most), np.empty(most), np.empty(most)
+    # Bits 1, 2 and 4: the box starts in the cell along x, y and z; 8: the triangle is fresh
+    bits, near = np.empty(most, np.uint8), np.empty(most, np.bool_)
     for c in range(len(first) - 1):
         size = first[c + 1] - first[c]
         if size < 2:
             continue
         cx, cy, cz = c % nx, (c // nx) % ny, c // (nx * ny)
+        here = listed[first[c] : first[c + 1]]
         for p in range(size):
-            i = listed[first[c] + p]
-            for k in range(3):
-                boxes[p, k], boxes[p, 3 + k] = low[i, k], high[i, k]
-                corners[p, k] = triangles[i, k]
-                round_corners[p, k] = triangles[i, k] if spread[triangles[i, k]] else -1
-            starts[p] = int((low[i, 0] - origin[0]) / edge) == cx
-            starts[p] |= (int((low[i, 1] - origin[1]) / edge) == cy) << 1
-            starts[p] |= (int((low[i, 2] - origin[2]) / edge) == cz) << 2
-            due[p] = fresh[i]
-        for p in range(size):
-            x0, y0, z0, x1, y1, z1 = (
-                boxes[p, 0], boxes[p, 1], boxes[p, 2], boxes[p, 3], boxes[p, 4], boxes[p, 5],
-            )  # fmt: skip
-            a, b, d = corners[p, 0], corners[p, 1], corners[p, 2]
+            i = here[p]
+            x0[p], y0[p], z0[p] = low[i, 0], low[i, 1], low[i, 2]
+            x1[p], y1[p], z1[p] = high[i, 0], high[i, 1], high[i, 2]
+            bits[p] = int((low[i, 0] - origin[0]) / edge) == cx
+            bits[p] |= (int((low[i, 1] - origin[1]) / edge) == cy) << 1
+            bits[p] |= (int((low[i, 2] - origin[2]) / edge) == cz) << 2
+            bits[p] |= fresh[i] << 3
+        for p in range(size - 1):
+            # The loop over other boxes writes to memory, so numbers in variables save reads.
+            left, back, under, own = x0[p], y0[p], z0[p], bits[p]
+            right, front, over = x1[p], y1[p], z1[p]
             for q in range(p + 1, size):
-                # A pair counts only in the cell with the least corner of the common box. All tests
-                # are evaluated without branches, because half of them would be mispredicted.
-                is_near = ((starts[p] | starts[q]) == 7) & (due[p] | due[q])
-                is_near &= (boxes[q, 0] <= x1) & (boxes[q, 1] <= y1) & (boxes[q, 2] <= z1)
-                is_near &= (boxes[q, 3] >= x0) & (boxes[q, 4] >= y0) & (boxes[q, 5] >= z0)
-                u, v, w = round_corners[q, 0], round_corners[q, 1], round_corners[q, 2]
-                is_near &= (u != a) & (u != b) & (u != d)
-                is_near &= (v != a) & (v != b) & (v != d)
-                is_near &= (w != a) & (w != b) & (w != d)
-                if not is_near:
+                is_near = (x0[q] <= right) & (y0[q] <= front) & (z0[q] <= over)
+                is_near &= (x1[q] >= left) & (y1[q] >= back) & (z1[q] >= under)
+                # A pair counts only in the cell with the least corner of the common box.
+                near[q] = is_near & ((bits[q] | own) == 15)
+            i = here[p]
+            for q in range(p + 1, size):
+                j = here[q]
+                if not near[q] or _share_spread(triangles, i, j, spread):
                     continue
-                i, j = listed[first[c] + p], listed[first[c] + q]
                 if not _may_meet(at, triangles, i, j):
                     continue
                 if count == len(found):
