@@ -141,7 +141,7 @@ class Engine:
                     yield place, None, error
                 else:
                     yield place, result, None
-                release_freed_memory()
+            release_freed_memory()
             return
         work, settle = carried(function)
         for place, answer, failure in self._outcomes_of_workers(function, work, tasks, needs):

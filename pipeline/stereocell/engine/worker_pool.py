@@ -24,7 +24,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 from stereocell.engine.interrupts import children_ignore_interrupts, interrupts_put_off
-from stereocell.engine.worker_process import READY, serve
+from stereocell.engine.worker_process import READY, REST, serve
 from stereocell.model.errors import StereoCellError
 
 T = TypeVar("T")
@@ -80,6 +80,8 @@ class WorkerPool:
             while len(self._workers) < self._count:
                 self._workers.append(self._start())
             yield from self._outcomes(function, tasks)
+            for worker in self._workers:
+                self._send_bytes(worker, REST)
         finally:
             # If the caller stopped early, workers are still busy with answers that nobody needs.
             if self._busy():
@@ -146,6 +148,9 @@ class WorkerPool:
     ) -> None:
         request = pickle.dumps((function, tasks[task]))
         worker.task = task
+        self._send_bytes(worker, request)
+
+    def _send_bytes(self, worker: _Worker, request: bytes) -> None:
         # a dead worker is noticed when its answer is received
         with suppress(ConnectionError):
             worker.pipe.send_bytes(request)

@@ -15,12 +15,15 @@ from typing import Any
 from stereocell.storage.processes import keep_freed_memory, release_freed_memory
 
 READY = "ready"  # first answer of a worker, once it has started
+REST = b"rest"  # request after the last task of a run; it has no answer
 
 
 def serve(pipe: "Connection[Any, Any]") -> None:
     """Run the tasks that arrive on a pipe, one after another, until its other end is closed.
 
     A request is the pickled (function, task). The answer is (result, None) or (None, error).
+    After a run, the request REST lets the worker return its memory. The tasks of one run have
+    arrays of similar sizes, so memory is kept between them.
     """
     keep_freed_memory()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the command itself reacts to Ctrl-C
@@ -28,8 +31,11 @@ def serve(pipe: "Connection[Any, Any]") -> None:
     try:
         pipe.send(READY)
         while True:
-            pipe.send_bytes(_answer(pipe.recv_bytes()))
-            release_freed_memory()
+            request = pipe.recv_bytes()
+            if request == REST:
+                release_freed_memory()
+            else:
+                pipe.send_bytes(_answer(request))
     except (EOFError, OSError):  # the command has closed its end, or has ended
         return
 

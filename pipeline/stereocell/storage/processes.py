@@ -49,14 +49,17 @@ def keep_freed_memory() -> None:
 def release_freed_memory() -> None:
     """Return to the system what `keep_freed_memory` has kept, if the process holds much memory.
 
-    Between two tasks of a build this is up to a gigabyte. The next task's arrays have other sizes,
-    so they would not fit into all of it, and the peak of the memory would grow from task to task. A
-    process with less than KEPT_BYTES keeps its memory, because Linux would clear it again for the
-    next task: a twelfth of the CPU time of a build of small tiles.
+    After a task of a build this is up to a gigabyte. The arrays of another kind of task have other
+    sizes, so they would not fit into all of it, and the peak of the memory would grow. A process
+    with less than KEPT_BYTES keeps its memory, because Linux would clear it again for the next
+    task: a twelfth of the CPU time of a build of small tiles.
     """
     if sys.platform != "linux" or not hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
         return
-    pages = int(Path("/proc/self/statm").read_text("utf-8").split()[1])
+    try:
+        pages = int(Path("/proc/self/statm").read_text("utf-8").split()[1])
+    except OSError:  # /proc is missing, or no file can be opened
+        return
     if pages * os.sysconf("SC_PAGE_SIZE") > KEPT_BYTES:
         libc.malloc_trim(0)
 
