@@ -85,6 +85,9 @@ help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
+REQUIRE_NODE := node -e 'const [a, b] = process.versions.node.split("."); process.exit(+(a * 100 + +b < 2019))' || \
+  { echo "setup: node is missing or older than 20.19, expected Node.js 20.19 or newer" >&2; exit 1; }
+
 setup: $(READY) $(KERNELS_READY) $(VIEWER_DIST) ## Make .venv and the viewer (Python 3.11+, Node 20.19+; PYTHON=python3.13: .venv-3.13 beside .venv)
 
 setup-dev: setup $(DEV_READY) ## The same with the packages of tests, linters, benchmarks and docs (1.7 GB more)
@@ -111,8 +114,7 @@ $(KERNELS_READY): $(READY)
 	@touch $@
 
 $(VIEWER_READY): $(VIEWER)/package-lock.json
-	@node -e 'const [a, b] = process.versions.node.split("."); process.exit(+(a * 100 + +b < 2019))' || \
-	  { echo "setup: node is missing or older than 20.19, expected Node.js 20.19 or newer" >&2; exit 1; }
+	@$(REQUIRE_NODE)
 	cd $(VIEWER) && npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
 
@@ -138,8 +140,10 @@ mono: browser ## Install Debian's Mono and shader compilers for the tests of the
 	  || echo "mono: can't be installed here, so tests of the Unity package are skipped" >&2; \
 	else echo "mono: no Mono or shader compilers, so tests of the Unity package are skipped; on Debian get them by: sudo make mono"; fi
 
-# The packages of Python, those of the viewer, the kernels and the sample are made side by side.
+# The packages of Python, those of the viewer, the kernels and the sample are made side by side. Node is
+# looked for first, since its error would otherwise stand between the lines of other steps.
 demo: ## Build and check a sample that comes with StereoCell (SAMPLE=cycif, brain-cells, mri or cells)
+	@test -e $(VIEWER_READY) || $(REQUIRE_NODE)
 	@$(MAKE) --no-print-directory -j3 setup $(DEMO_INPUT)
 	$(WITH_ARGS) $(RUN) build $(DEMO_INPUT) --out="$$OUT" --workers="$$WORKERS" $(DEMO_ARGS) ARGS
 	@echo

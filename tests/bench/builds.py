@@ -43,7 +43,8 @@ REAL = {
     "head, CT": ("ct_head_ge", ["--preset", "ct"]),
     "head, MRI at 7 T": ("mri_t1_7t/dicoms", ["--preset", "mri"]),
 }
-COMPARED = (*COLUMNS, "before: seconds, references", "times as fast: seconds, references")
+MEASURES = "seconds, CPU, references"
+COMPARED = (*COLUMNS, f"before: {MEASURES}", f"times as fast: {MEASURES}")
 TITLES = {1: "By one worker", 2: "By two workers"}  # of the published tables
 
 
@@ -101,8 +102,13 @@ def compared_rows(built: Built) -> list[list[str]]:
         before, now = (costs | totals(costs) for costs in (built.before, built.costs))
         for row in rows:
             old, new = before[row[0]], now[row[0]]
-            row.append(f"{old.seconds:.1f}; {old.references:,.0f}")
-            row.append(f"{old.seconds / new.seconds:.2f}; {old.references / new.references:.2f}")
+            row.append(f"{old.seconds:.1f}; {old.cpu:.1f}; {old.references:,.0f}")
+            ratios = (
+                old.seconds / new.seconds,
+                old.cpu / new.cpu,
+                old.references / new.references,
+            )
+            row.append("; ".join(f"{ratio:.2f}" for ratio in ratios))
     return [title, *rows]
 
 

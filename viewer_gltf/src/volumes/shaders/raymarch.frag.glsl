@@ -111,7 +111,8 @@ layout(location = 1) out vec4 oBehind;  // behind the pane
 const float NOWHERE = 1e30;
 
 // Share of a pixel, 0 to 1, below which a sample is lit as matter without a boundary. Its gradient
-// would take eight samples more, and change less than half a step of 8 bits.
+// would take eight samples more. For one sample it changes less than half a step of 8 bits; for many
+// samples of a ray it changed a picture of nuclei by 0.02 dB (docs/decisions/ray-march.md).
 const float FAINT = 0.002;
 
 #ifdef SUM
