@@ -32,7 +32,8 @@ class Copy:
     scale: float = 1.0
 
 
-TILE = r"(?s)By two workers.*sample tile of 194 x 512 x 512.*?one command \| "
+AT_ONCE = r"one command \| "
+TILE = rf"(?s)By two workers.*sample tile of 194 x 512 x 512.*?{AT_ONCE}"
 COPIES = [
     Copy(page, *others)  # type: ignore[arg-type]
     for page, copies in {
@@ -56,7 +57,20 @@ COPIES = [
             (r"64\^3 voxels \| (\S+) minutes", "breadth", r"968 units take (\S+) minutes"),
         ],
         "decisions/unit-of-work-scene.md": [
-            (r"sample tile .* \| 119\.8, now (\S+)", "builds", TILE + r"(\S+)"),
+            *(
+                (rf"\| {name} \| {shown}", "builds", rf"(?s){table}.*?\*\*{name}.*?{measured}")
+                for name in ("sample tile", "brain cells", "head, CT", "head, MRI at 7 T")
+                for table, shown, measured in (
+                    ("By one worker", r"([^,]+), now", AT_ONCE + r"(?:[^|]+\| ){4}[^;]+; ([^;]+)"),
+                    ("By one worker", r"[^|]+now (\S+)", AT_ONCE + r"\S+ \| (\S+)"),
+                    (
+                        "By two workers",
+                        r"(?:[^|]+\| ){2}([^,]+),",
+                        AT_ONCE + r"(?:[^|]+\| ){4}([^;]+)",
+                    ),
+                    ("By two workers", r"(?:[^|]+\| ){2}[^|]+now (\S+)", AT_ONCE + r"(\S+)"),
+                )
+            ),
             (r"it takes (\S+) minutes", "scene", r"the build \| (\S+)", 1 / 60),
             (r"the deep check (\S+)\.", "scene", r"check \| (\S+)", 1 / 60),
         ],
