@@ -1,4 +1,4 @@
-"""Normals of a bundle's surface agree with the stage's as closely as 8 bits allow."""
+"""A bundle's surface agrees with the stage's as closely as 8 bits and a lattice allow."""
 
 import json
 import struct
@@ -10,9 +10,12 @@ import pytest
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
 from stereocell.formats.gltf_decode import read_glb
+from stereocell.formats.tiles3d_walk import Content
 from stereocell.model.errors import CheckError
 from stereocell.model.mesh import Mesh
-from stereocell.verify.bundle_surfaces import _compare_faces
+from stereocell.usd.read_levels import ComposedLod
+from stereocell.usd.read_textures import ComposedMaps
+from stereocell.verify.bundle_surfaces import _compare_faces, compare_surfaces
 from stereocell.verify.paired_surfaces import Surface, pair_surfaces
 
 
@@ -73,3 +76,24 @@ def test_a_file_that_states_more_rows_than_memory_holds_is_refused(
     (tmp_path / "large.glb").write_bytes(head + text + data[20 + length :])
     with pytest.raises(CheckError, match="expected at most 1073741824"):
         read_glb(tmp_path / "large.glb")
+
+
+@pytest.mark.parametrize(("moved_um", "problems"), [(1e-4, []), (3, ["the bundle lacks lod1"])])
+def test_a_level_without_a_file_is_drawn_by_the_finer_one_if_only_rounding_parts_them(
+    moved_um: float, problems: list[str], fins: Mesh, tmp_path: Path
+) -> None:
+    def level(number: int, mesh: Mesh) -> ComposedLod:
+        return ComposedLod(
+            number, mesh, 0.0, 0.0, grey, ComposedMaps(), np.eye(4), "", "", tuple(np.eye(4).flat)
+        )
+
+    grey, file = Material((0.5, 0.5, 0.5)), tmp_path / "lod0.glb"
+    glb = encode_glb(fins, choose_step(2100), material=grey, name="fins", extras={})
+    file.write_bytes(glb.data)
+    moved = replace(fins, positions=fins.positions + np.float32(moved_um))
+    worst, found = compare_surfaces(
+        {0: Content(tmp_path / "tileset.json", file, {}, 0.0, 0.0, ())},
+        {0: level(0, fins), 1: level(1, moved)},
+    )
+    assert found == problems
+    assert worst < 1

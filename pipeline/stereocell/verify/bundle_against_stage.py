@@ -23,7 +23,7 @@ from stereocell.usd.read_stage import loaded, open_stage
 from stereocell.usd.read_variants import TileChoice
 from stereocell.usd.read_volume import ComposedVolume, read_volume
 from stereocell.verify.bundle_files import find_differences
-from stereocell.verify.bundle_surfaces import compare_surfaces, surfaces_of, without_repeats
+from stereocell.verify.bundle_surfaces import compare_surfaces, surfaces_of
 from stereocell.verify.bundle_volumes import compare_volume, find_volume, placement_of
 
 
@@ -110,7 +110,7 @@ def _compare_channel(
     name = f"{task.tile_id}/{appearance.id}"
     shown = shown_lods(tile, appearance.id, choice.finest_lod)
     contents = dict(surfaces_of(task.bundle, channel, task.tile_id))
-    worst, faults = compare_surfaces(contents, dict(without_repeats(shown.lods)))
+    worst, faults = compare_surfaces(contents, {lod.level: lod for lod in shown.lods})
     problems, joints = [f"{name}: {fault}" for fault in faults], {}
     composed = read_volume(tile, appearance.id)
     entry = find_volume(task.bundle, channel, task.tile_id)

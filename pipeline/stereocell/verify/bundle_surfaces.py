@@ -50,28 +50,6 @@ _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
 }
 
 
-def without_repeats(lods: Sequence[ComposedLod]) -> Iterator[tuple[int, ComposedLod]]:
-    """Yield the levels of detail in a bundle: the finest of several equal successive ones."""
-    last: ComposedLod | None = None
-    for lod in lods:
-        if last is None or not _are_alike(last, lod):
-            yield lod.level, lod
-        last = lod
-
-
-def _are_alike(one: ComposedLod, other: ComposedLod) -> bool:
-    def arrays(lod: ComposedLod) -> list[NDArray[Any] | None]:
-        mesh, maps = lod.mesh, lod.images or lod.maps
-        images = [None if m is None else read_image(m) for m in (maps.normal, maps.occlusion,
-                                                                 maps.color)]  # fmt: skip
-        return [mesh.positions, mesh.triangles, mesh.normals, mesh.colors, mesh.openness, *images]
-
-    if one.material != other.material or len(one.mesh.triangles) != len(other.mesh.triangles):
-        return False
-    pairs = zip(arrays(one), arrays(other), strict=True)
-    return all(a is b if a is None or b is None else np.array_equal(a, b) for a, b in pairs)
-
-
 def surfaces_of(
     bundle: Path, channel: dict[str, Any], tile_id: str
 ) -> Iterator[tuple[int, Content]]:
@@ -88,13 +66,25 @@ def compare_surfaces(
 ) -> tuple[float, list[str]]:
     """Return the largest distance of a vertex from its stage position, and the problems.
 
+    A bundle has no file of a level that would have the same bytes as the next finer one. The finer
+    file then stands for that level, too. Its positions are rounded to the lattice, so the levels
+    may differ a little in the stage.
+
     The distance is in lattice steps.
     """
     problems = [f"the stage lacks lod{level}" for level in contents if level not in lods]
-    problems += [f"the bundle lacks lod{level}" for level in sorted(lods.keys() - contents.keys())]
     worst, error_m, corners = 0.0, 0.0, []
-    for level in sorted(contents.keys() & lods.keys()):
-        content, lod = contents[level], lods[level]
+    drawn: DecodedMesh | None = None  # the last level that has a file
+    is_last = False
+    for level, lod in sorted(lods.items()):
+        content = contents.get(level)
+        if content is None:
+            apart, faults = (0.0, [""]) if drawn is None else _compare_surface(drawn, lod, is_last)
+            if faults:
+                problems.append(f"the bundle lacks lod{level}")
+            else:
+                worst = max(worst, apart)
+            continue
         is_last = level == max(contents) and len(contents) > 1
         drawn = read_glb(content.path)
         apart, faults = _compare_surface(drawn, lod, is_last)
