@@ -68,11 +68,11 @@ def watch(
     cost, before = Cost(), measure_reference()
     start, busy = time.perf_counter(), sum(_cpu_of(other) for other in others)
     # A pipe that is not read would fill up and stop the command.
-    with tempfile.TemporaryFile("w+") as errors:
+    with tempfile.TemporaryFile("w+") as printed:
         command = subprocess.Popen(
             [*STEREOCELL, *arguments],
-            stdout=subprocess.DEVNULL,
-            stderr=errors,
+            stdout=printed,  # the faults that a check found
+            stderr=printed,
             env=environment_of(checkout),
         )
         parent, spent = psutil.Process(command.pid), dict[int, float]()
@@ -80,8 +80,8 @@ def watch(
             _look(parent, others, cost, spent)
             time.sleep(OFTEN_S)
         if command.returncode:
-            errors.seek(0)
-            raise SystemExit(f"{' '.join(arguments)}: {errors.read()[-2000:]}")
+            printed.seek(0)
+            raise SystemExit(f"{' '.join(arguments)}: {printed.read()[-2000:]}")
     cost.seconds = time.perf_counter() - start
     cost.cpu = sum(spent.values()) + sum(_cpu_of(other) for other in others) - busy
     cost.load, cost.reference = load(), (before + measure_reference()) / 2
