@@ -71,7 +71,7 @@ def watch(
     with tempfile.TemporaryFile("w+") as printed:
         command = subprocess.Popen(
             [*STEREOCELL, *arguments],
-            stdout=printed,  # the faults that a check found
+            stdout=printed,  # names the faults if `check` fails
             stderr=printed,
             env=environment_of(checkout),
         )

@@ -329,7 +329,7 @@ def find_candidates(
             bits[p] |= (int((low[i, 2] - origin[2]) / edge) == cz) << 2
             bits[p] |= fresh[i] << 3
         for p in range(size - 1):
-            # The loop over other boxes writes to memory, so numbers in variables save reads.
+            # Variables, because the compiler reads an array again after each write to `near`
             left, back, under, own = x0[p], y0[p], z0[p], bits[p]
             right, front, over = x1[p], y1[p], z1[p]
             for q in range(p + 1, size):
